@@ -1,10 +1,12 @@
-//! Gives the linker the board's memory map and the scripts that lay the image out. Here and not in `.cargo/config.toml`,
-//! where a `RUSTFLAGS` of the environment would silently replace them. Refuses an image for no board or for two, as the HAL does in its own words.
+//! Gives the linker the board's memory map and the scripts that lay the image out. Here and not in
+//! `.cargo/config.toml`, where a `RUSTFLAGS` of the environment would silently replace them.
+//! Refuses an image for no board or for two, as the HAL does in its own words.
 
 use std::path::PathBuf;
 use std::{env, fs};
 
-/// The boards: the feature of each, as cargo hands it to this script, and where its memory map lies.
+/// The boards: the feature of each, as cargo hands it to this script, and the place of its memory
+/// map.
 const BOARDS: [(&str, &str); 2] =
     [("DISCOVERY", "../memory.x"), ("NUCLEO_F429ZI", "src/board/nucleo_f429zi/memory.x")];
 

@@ -1,4 +1,5 @@
-//! A body: structures in the order in which they are laid over one another, and the list of those that a line meets.
+//! A body: structures in the order in which they are laid over one another, and the list of those
+//! that a line meets.
 
 use crate::solid::{Convex, Stretch, inside_all};
 use crate::vector::Vector;
@@ -76,8 +77,8 @@ pub struct Body {
 }
 
 impl Body {
-    /// Returns what a line from `origin` along `direction` (of length 1) meets in its first `reach_mm`, in order. Stretches outside of the body are
-    /// left out.
+    /// Returns what a line from `origin` along `direction` (of length 1) meets in its first
+    /// `reach_mm`, in order. Stretches outside of the body are left out.
     pub fn met(&self, origin: Vector, direction: Vector, reach_mm: f64) -> Vec<Piece> {
         let mut stretches: Vec<(usize, Stretch)> = vec![];
         for (number, structure) in self.structures.iter().enumerate() {

@@ -1,11 +1,14 @@
 //! Bodies as surfaces and tubes in three dimensions, and what a straight needle meets in them.
 //!
-//! A body is a list of structures, each a union of intersections of convex solids. Where structures overlap the later one counts, so that
-//! a bursa is a ball with the tendon's ball inside it. A needle is a ray: each convex solid holds at most one stretch of it, found by solving for its
-//! ends, and the list of layers follows. The law of force, the picture, the ultrasound image and the section all ask here.
+//! A body is a list of structures, each a union of intersections of convex solids. Where structures
+//! overlap the later one counts, so that a bursa is a ball with the tendon's ball inside it. A
+//! needle is a ray: each convex solid holds at most one stretch of it, found by solving for its
+//! ends, and the list of layers follows. The law of force, the picture, the ultrasound image and
+//! the section all ask here.
 //!
-//! Lengths are in mm. The limb's frame: x along the limb away from the trunk, y to its side, z down; the limb's axis is at y = z = 0.
-//! The figures of each site, with their sources, stand in `docs/anatomy.md`.
+//! Lengths are in mm. The limb's frame: x along the limb away from the trunk, y to its side, z
+//! down; the limb's axis is at y = z = 0. The figures of each site, with their sources, stand in
+//! `docs/anatomy.md`.
 
 #![forbid(unsafe_code)]
 

@@ -24,7 +24,8 @@ pub struct Outline {
 }
 
 impl Body {
-    /// Returns the outlines in the plane of the block's x and z, in the order in which they are laid over one another.
+    /// Returns the outlines in the plane of the block's x and z, in the order in which they are
+    /// laid over one another.
     pub fn outlines(&self, block: &Block) -> Vec<Outline> {
         let parts = self.structures.iter().enumerate();
         let parts = parts.flat_map(|(structure, own)| own.parts.iter().map(move |part| (structure, part)));
@@ -91,7 +92,7 @@ fn end(mut empty: f64, mut full: f64, column: impl Fn(f64) -> Option<Stretch>) -
 mod tests {
     use crate::{Place, Site};
 
-    /// The needle's own line is in the section: what it meets at 45° stands on the outlines.
+    /// The needle's own line is in the section: what it meets at 45° is on the outlines.
     #[test]
     fn a_section_shows_what_the_needle_meets() {
         let body = Site::Shoulder.body(4.39);

@@ -1,4 +1,5 @@
-//! The place and the direction in which a needle enters a limb that may be turned, and the frame in which a picture shows it.
+//! The place and the direction in which a needle enters a limb that may be turned, and the frame in
+//! which a picture shows it.
 
 use crate::body::{Body, Piece};
 use crate::vector::{Vector, add, dot, scale, sub};
@@ -38,7 +39,8 @@ impl fmt::Display for Refusal {
 
 impl std::error::Error for Refusal {}
 
-/// The frame of a picture about the point of entry: x horizontal in the needle's plane, y horizontal across it, z down.
+/// The frame of a picture about the point of entry: x horizontal in the needle's plane, y
+/// horizontal across it, z down.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Block {
     /// The point of entry in the limb's frame, mm.
@@ -72,7 +74,8 @@ pub struct Line {
     pub block: Block,
     /// The needle's direction in the limb's frame.
     pub direction: Vector,
-    /// The direction of length 1 into the body perpendicular to the skin at entry, in the block's frame.
+    /// The direction of length 1 into the body perpendicular to the skin at entry, in the block's
+    /// frame.
     pub inwards: Vector,
     /// The angle between needle and skin at entry, degrees.
     pub angle_deg: f64,
@@ -139,7 +142,8 @@ impl Place {
 }
 
 impl Line {
-    /// Returns what the needle meets in its first `reach_mm`, in order, mm along the needle from the skin.
+    /// Returns what the needle meets in its first `reach_mm`, in order, mm along the needle from
+    /// the skin.
     pub fn met(&self, body: &Body, reach_mm: f64) -> Vec<Piece> {
         body.met(self.block.origin, self.direction, reach_mm)
     }
@@ -160,7 +164,8 @@ mod tests {
         pieces.iter().map(|p| (body.structures[p.structure].name, p.from_mm)).collect()
     }
 
-    /// The figures of docs/anatomy.md straight in: 2.5 mm of skin, then fat, deltoid to 12 mm over the bursa.
+    /// The figures of docs/anatomy.md straight in: 2.5 mm of skin, then fat, deltoid to 12 mm over
+    /// the bursa.
     #[test]
     fn straight_in_the_layers_are_as_thick_as_the_figures_say() {
         let place = Place { along_mm: 5.0, ..STRAIGHT };
@@ -177,7 +182,8 @@ mod tests {
         }
     }
 
-    /// A limb that turns with the point of entry under a needle that turns with both is the same limb.
+    /// A limb that turns with the point of entry under a needle that turns with both is the same
+    /// limb.
     #[test]
     fn turning_the_limb_is_moving_the_needle_around_it() {
         let round = Site::Shoulder;

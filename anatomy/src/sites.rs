@@ -45,7 +45,8 @@ impl Site {
         }
     }
 
-    /// Returns the body with fat of this thickness, mm: what lies under the fat stays, the skin moves out.
+    /// Returns the body with fat of this thickness, mm: what lies under the fat stays, the skin
+    /// moves out.
     pub fn body(self, fat_mm: f64) -> Body {
         let structures = match self {
             Self::Shoulder => shoulder(fat_mm),

@@ -62,7 +62,8 @@ impl Convex {
         }
     }
 
-    /// Returns the direction of length 1 that leads out of it most quickly at a place on its surface.
+    /// Returns the direction of length 1 that leads out of it most quickly at a place on its
+    /// surface.
     pub fn outwards(&self, place: Vector) -> Vector {
         match *self {
             Self::Cylinder { across, down } => {

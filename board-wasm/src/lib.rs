@@ -1,7 +1,9 @@
-//! A real board in the browser, over WebSerial and WebUSB, behind functions of plain numbers, bytes and JSON texts. `page/` is the other
-//! side: it opens ports, carries bytes and shows what it is told, and decides nothing.
+//! A real board in the browser, over WebSerial and WebUSB, behind functions of plain numbers, bytes
+//! and JSON texts. `page/` is the other side: it opens ports, carries bytes and shows what it is
+//! told, and decides nothing.
 //!
-//! The names are exported as they stand, which the language counts as unsafe; there is no other unsafe code.
+//! The names are exported as they stand, which the language counts as unsafe; there is no other
+//! unsafe code.
 
 pub mod dfu;
 pub mod session;
@@ -63,7 +65,8 @@ pub extern "C" fn board_reset() {
     SESSION.replace(Session::default());
 }
 
-/// Takes `count` bytes of the port, `now_ms` after it was opened. Returns the length of the bytes to send.
+/// Takes `count` bytes of the port, `now_ms` after it was opened. Returns the length of the bytes
+/// to send.
 #[unsafe(no_mangle)]
 pub extern "C" fn board_exchange(count: u32, now_ms: f64) -> u32 {
     SESSION.with_borrow_mut(|session| heard(count, |bytes| say(session.exchange(time(now_ms), bytes))))
@@ -85,7 +88,8 @@ pub extern "C" fn board_begin(count: u32) -> u32 {
     say_error(done)
 }
 
-/// Takes the guide's answer in `count` bytes of JSON. Returns the length of what is wrong with it, or 0.
+/// Takes the guide's answer in `count` bytes of JSON. Returns the length of what is wrong with it,
+/// or 0.
 #[unsafe(no_mangle)]
 pub extern "C" fn board_answer(count: u32) -> u32 {
     let answer = heard(count, |bytes| serde_json::from_slice::<GuideAnswer>(bytes));
@@ -99,8 +103,8 @@ pub extern "C" fn board_file() -> u32 {
     SESSION.with_borrow(|session| say(session.file().unwrap_or_default().as_bytes()))
 }
 
-/// Prepares an update: `count` bytes are the name of the bootloader's interface, a zero, and the DfuSe file. Returns the length of
-/// why not, or 0.
+/// Prepares an update: `count` bytes are the name of the bootloader's interface, a zero, and the
+/// DfuSe file. Returns the length of why not, or 0.
 #[unsafe(no_mangle)]
 pub extern "C" fn dfu_begin(count: u32) -> u32 {
     let update = heard(count, |bytes| {

@@ -1,8 +1,8 @@
-//! One connection to a board, from the opening of its port to its end. A new connection is a new session: nothing that was asked for in an
-//! earlier one is left.
+//! One connection to a board, from the opening of its port to its end. A new connection is a new
+//! session: nothing that was asked for in an earlier one is left.
 //!
-//! By itself a session says hello and stop, and nothing else. Everything beyond belongs to a work that a person began, and that
-//! ends when the board starts anew.
+//! By itself a session says hello and stop, and nothing else. Everything beyond belongs to a work
+//! that a person began, and that ends when the board starts anew.
 
 use crate::view::View;
 use crate::work::{Task, Work};

@@ -1,4 +1,5 @@
-//! Commissioning or compensation on the board, one step at a time, each begun by a press on the guide's button.
+//! Commissioning or compensation on the board, one step at a time, each begun by a press on the
+//! guide's button.
 
 use device_setup::bench::{Act, Line};
 use device_setup::commission::{self, Wish};
@@ -70,7 +71,8 @@ struct Shared {
 }
 
 impl Work {
-    /// Prepares a task; what is wrong with its numbers where something is. Nothing is sent before the first step is begun.
+    /// Prepares a task; what is wrong with its numbers where something is. Nothing is sent before
+    /// the first step is begun.
     pub fn new(task: Task) -> Result<Self, Error> {
         let title = match task {
             Task::Commission { .. } => "Commissioning",
@@ -86,7 +88,8 @@ impl Work {
         Ok(Self { shared, dialogue: Some(dialogue), file: None })
     }
 
-    /// Takes what has come from the board, goes on as far as that allows, and adds what is to be sent to `out`.
+    /// Takes what has come from the board, goes on as far as that allows, and adds what is to be
+    /// sent to `out`.
     pub fn exchange(&mut self, now: Duration, heard: &[u8], reading: Option<Reading>, out: &mut Vec<u8>) {
         {
             let mut shared = self.shared.borrow_mut();

@@ -1,16 +1,19 @@
-//! The positions of the layers along the needle and their states: touched, pushed in, given way, left. It
-//! serves the laws of force, which all ask here, and knows none of them.
+//! The positions of the layers along the needle and their states: touched, pushed in, given way,
+//! left. It serves the laws of force, which all ask here, and knows none of them.
 //!
-//! A layer has its depth perpendicular to the skin and stays there. Along the needle it is met at depth / sin(angle to the
-//! skin), which changes when the needle turns. A wall that has not given way is pushed in and carries what lies under it
-//! along: the next layer is touched only once the wall above it has given way. Then the wall springs back to a stated part
-//! of its indentation, and that part vanishes with its relief: the next layer lies deeper by the remaining indentation where the tip
-//! comes to it, or is met where the wall gave way, if that is further in. So the order of events is the order of the anatomy, and where
-//! a wall is met does not depend on when a tick falls.
+//! A layer has its depth perpendicular to the skin and stays there. Along the needle it is met at
+//! depth / sin(angle to the skin), which changes when the needle turns. A wall that has not given
+//! way is pushed in and carries what lies under it along: the next layer is touched only once the
+//! wall above it has given way. Then the wall springs back to a stated part of its indentation, and
+//! that part vanishes with its relief: the next layer lies deeper by the remaining indentation
+//! where the tip comes to it, or is met where the wall gave way, if that is further in. So the
+//! order of events is the order of the anatomy, and where a wall is met does not depend on when a
+//! tick falls.
 //!
-//! The angle is the measured tilt less what the tilt reads with the needle laid on the skin. It is smoothed over 51 ms and
-//! taken over in steps of a milliradian with three quarters of one as dead band; a layer that was touched is left only
-//! 0.2 mm further out. Noise of a milliradian therefore makes no layer come and go: at 15° it moves a vein by 0.07 mm.
+//! The angle is the measured tilt less what the tilt reads with the needle laid on the skin. It is
+//! smoothed over 51 ms and taken over in steps of a milliradian with three quarters of one as dead
+//! band; a layer that was touched is left only 0.2 mm further out. Noise of a milliradian therefore
+//! makes no layer come and go: at 15° it moves a vein by 0.07 mm.
 
 use crate::event::{Transitions, VesselState};
 use crate::math::{reciprocal, sine, truncating_product};
@@ -19,15 +22,18 @@ use crate::units::{Millimetres, Milliradians};
 use fixed::types::{I2F30, I8F24, I16F16};
 use heapless::Vec;
 
-/// The smallest angle to the skin that is distinguished: 5°. Below it, layers stay where they are met at 5°.
+/// The smallest angle to the skin that is distinguished: 5°. Below it, layers stay where they are
+/// met at 5°.
 pub(crate) const SMALLEST_ANGLE: Milliradians = Milliradians(87);
 /// Straight in.
 pub(crate) const LARGEST_ANGLE: Milliradians = Milliradians(1_571);
-/// A layer is left when the tip is this far outside it: 0.2 mm along the needle, so that a tremor does not heal a wall.
+/// A layer is left when the tip is this far outside it: 0.2 mm along the needle, so that a tremor
+/// does not heal a wall.
 const EXIT_DISTANCE: I16F16 = I16F16::from_bits(13_107);
 /// Ticks from one look at the tilt to the next.
 pub(crate) const LOOK_TICKS: u32 = 16;
-/// Share of the way to the measured tilt at each look, as a shift: with [`LOOK_TICKS`], a time constant of 51 ms.
+/// Share of the way to the measured tilt at each look, as a shift: with [`LOOK_TICKS`], a time
+/// constant of 51 ms.
 const SMOOTHING: u32 = 5;
 /// The angle follows what is smoothed once it is this far off: 0.75 mrad in Q16.
 const DEAD_BAND: u32 = 49_152;
@@ -109,7 +115,8 @@ struct Angle {
     depth_per_path: I2F30,
 }
 
-/// A new angle on its way, a part in each of four ticks: all of it in one would make that tick the longest of all.
+/// A new angle on its way, a part in each of four ticks: all of it in one would make that tick the
+/// longest of all.
 #[derive(Clone, Copy, Debug, Default)]
 enum Turning {
     /// The angle that was taken over holds.
@@ -125,8 +132,9 @@ enum Turning {
     Placed(Angle),
 }
 
-/// The tip's place among the layers. It comes through layers and walls in their order, so that two numbers say which it has
-/// touched and which have given way; it meets or leaves at most one layer a tick.
+/// The tip's place among the layers. It comes through layers and walls in their order, so that two
+/// numbers say which it has touched and which have given way; it meets or leaves at most one layer
+/// a tick.
 #[derive(Clone, Debug)]
 pub(crate) struct Insertion {
     angle: Angle,
@@ -152,7 +160,8 @@ pub(crate) struct Insertion {
     beside: I16F16,
     /// A bit for each layer that has given way by the law of force.
     open: u8,
-    /// A bit for each layer that was touched, gave way or was left in this tick; the vessel is looked at for them in the next.
+    /// A bit for each layer that was touched, gave way or was left in this tick; the vessel is
+    /// looked at for them in the next.
     happened: u8,
     /// The same of this tick and the one before.
     busy: u8,
@@ -216,7 +225,8 @@ impl Insertion {
         self.given
     }
 
-    /// Returns the depth of layer `index` along the needle; the largest number if there is no such layer.
+    /// Returns the depth of layer `index` along the needle; the largest number if there is no such
+    /// layer.
     pub(crate) fn top(&self, index: usize) -> I16F16 {
         self.tops.get(index).copied().unwrap_or(I16F16::MAX)
     }
@@ -226,7 +236,8 @@ impl Insertion {
         depth.0.saturating_sub(self.origins.get(index).copied().unwrap_or(I16F16::MAX))
     }
 
-    /// The layer that the tip is in. A touched one may be a little deeper than the tip that draws back.
+    /// The layer that the tip is in. A touched one may be a little deeper than the tip that draws
+    /// back.
     pub(crate) fn innermost(&self, depth: Millimetres) -> usize {
         let last = self.touched.saturating_sub(1);
         if depth.0 >= self.top(last) { last } else { self.innermost_above(last, depth) }
@@ -244,7 +255,8 @@ impl Insertion {
         self.open
     }
 
-    /// The law of force says which layers have given way: a bit each. What it means for the vessel is seen in the next tick.
+    /// The law of force says which layers have given way: a bit each. What it means for the vessel
+    /// is seen in the next tick.
     pub(crate) fn open(&mut self, open: u8) {
         let changed = open ^ self.open;
         self.happened |= changed;
@@ -252,12 +264,14 @@ impl Insertion {
         self.open = open;
     }
 
-    /// True in a tick in which a layer is touched, gives way or is left, and in the next one, in which the vessel is looked at.
+    /// True in a tick in which a layer is touched, gives way or is left, and in the next one, in
+    /// which the vessel is looked at.
     pub(crate) fn is_busy(&self) -> bool {
         self.busy != 0
     }
 
-    /// Takes over the tilt of the next look as it is, without smoothing: what was before does not matter.
+    /// Takes over the tilt of the next look as it is, without smoothing: what was before does not
+    /// matter.
     pub(crate) fn begin(&mut self) {
         self.is_new = true;
         self.turning = Turning::Done;
@@ -283,7 +297,8 @@ impl Insertion {
         transitions
     }
 
-    /// Takes over the tilt as it is, all at once. Like its parts out of the way of the ticks that look at nothing.
+    /// Takes over the tilt as it is, all at once. Like its parts out of the way of the ticks that
+    /// look at nothing.
     #[cold]
     #[inline(never)]
     pub(crate) fn look_anew(&mut self, anatomy: &Anatomy, tilt: Milliradians) {
@@ -312,8 +327,8 @@ impl Insertion {
         }
     }
 
-    /// The next part of taking over an angle, if one is on its way: three times in [`LOOK_TICKS`], so that it is there 3 ms after the
-    /// look.
+    /// The next part of taking over an angle, if one is on its way: three times in [`LOOK_TICKS`],
+    /// so that it is there 3 ms after the look.
     #[inline(never)]
     pub(crate) fn turn(&mut self, anatomy: &Anatomy) {
         self.turning = match self.turning {
@@ -348,10 +363,12 @@ impl Insertion {
         }
     }
 
-    /// Returns the extra depth of the next layer where the tip comes to it, due to the remaining indentation of the last wall.
+    /// Returns the extra depth of the next layer where the tip comes to it, due to the remaining
+    /// indentation of the last wall.
     ///
-    /// With l left at the puncture and none from R on, l·(R − x)/ρ remains at x, ρ the way from the puncture to R. The tip comes to a
-    /// layer at T, which lies at `T + l·(R − x)/ρ` then, at `x = T + (R − T)·l/(l + ρ)`.
+    /// With l left at the puncture and none from R on, l·(R − x)/ρ remains at x, ρ the way from the
+    /// puncture to R. The tip comes to a layer at T, which lies at `T + l·(R − x)/ρ` then, at `x =
+    /// T + (R − T)·l/(l + ρ)`.
     fn carried_along(&self, anatomy: &Anatomy) -> I16F16 {
         let Some((wall, origin)) = self.last_given(anatomy) else { return I16F16::ZERO };
         let before = origin.saturating_add(wall.relieved).saturating_sub(self.top(self.touched));
@@ -365,7 +382,8 @@ impl Insertion {
         anatomy.walls.get(last).zip(self.origins.get(last).copied())
     }
 
-    /// The layer that the tip touches or leaves; a wall is whole again once the tip has left its layer.
+    /// The layer that the tip touches or leaves; a wall is whole again once the tip has left its
+    /// layer.
     fn cross_layer(&mut self, anatomy: &Anatomy, depth: Millimetres) -> Transitions {
         if let Some(next) = anatomy.layers.get(self.touched)
             && depth.0 >= self.top(self.touched)
@@ -389,7 +407,8 @@ impl Insertion {
         Transitions::default()
     }
 
-    /// A layer is touched. Its wall, if it has one, is pushed in from `place` on, or from where the wall above has just given way.
+    /// A layer is touched. Its wall, if it has one, is pushed in from `place` on, or from where the
+    /// wall above has just given way.
     #[inline(never)]
     fn touch(&mut self, anatomy: &Anatomy, layer: &Layer, mut place: I16F16) {
         if self.is_springing_back
@@ -426,7 +445,8 @@ impl Insertion {
         }
     }
 
-    /// The tip's place as seen from a vessel that it does not pass beside: in the tick after a layer was touched, gave way or was left.
+    /// The tip's place as seen from a vessel that it does not pass beside: in the tick after a
+    /// layer was touched, gave way or was left.
     #[inline(never)]
     fn look_at_vessel(&mut self, anatomy: &Anatomy, transitions: &mut Transitions) {
         let Some(Vessel::Met { near, far }) = anatomy.vessel else { return };
@@ -455,7 +475,7 @@ impl Angle {
 }
 
 impl Anatomy {
-    /// The angle to the skin at a measured tilt, within what is told apart.
+    /// The angle to the skin at a measured tilt, within what is distinguished.
     fn angle(&self, tilt: Milliradians) -> Milliradians {
         Milliradians(tilt.0.saturating_sub(self.skin_tilt).clamp(SMALLEST_ANGLE.0, LARGEST_ANGLE.0))
     }

@@ -1,13 +1,16 @@
-//! The clamped proxy that all three laws hold the needle with: an anchor `w` that is dragged along at a distance which the
-//! force allows, and may come after the needle by itself; the force is a stiffness times `x − w`.
+//! The clamped proxy that all three laws hold the needle with: an anchor `w` that is dragged along
+//! at a distance which the force allows, and may come after the needle by itself; the force is a
+//! stiffness times `x − w`.
 
 use crate::units::Millimetres;
 use fixed::types::{I2F30, I16F16, I32F32};
 
-/// The point that the needle is held to: P_curr_f of Paper 001's eq. 2, the tracking wall of Paper 002.
+/// The point that the needle is held to: P_curr_f of Paper 001's eq. 2, the tracking wall of
+/// Paper 002.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Anchor {
-    /// Finer than a depth: an anchor that comes after the needle does so by shares of a thousandth and less.
+    /// Finer than a depth: an anchor that comes after the needle does so by shares of a thousandth
+    /// and less.
     position: I32F32,
 }
 
@@ -23,8 +26,8 @@ impl Anchor {
         self.position += I32F32::from_bits((way * i64::from(share.to_bits())) >> 14);
     }
 
-    /// Is dragged along by a needle at `depth`, no further than `behind` it on its way in and `ahead` of it on its way out.
-    /// Neither is negative. Whether it was dragged.
+    /// Is dragged along by a needle at `depth`, no further than `behind` it on its way in and
+    /// `ahead` of it on its way out. Neither is negative. Whether it was dragged.
     pub(crate) fn drag(&mut self, depth: Millimetres, behind: I16F16, ahead: I16F16) -> bool {
         let (nearest, furthest) = (depth.0.saturating_sub(behind), depth.0.saturating_add(ahead));
         let at = coarse(self.position);

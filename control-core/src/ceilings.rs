@@ -1,5 +1,6 @@
-//! Ceilings that no command raises: those that a board's firmware was built with, and those of a device that has been
-//! commissioned. It compares configurations; who may send which one is `link`'s business.
+//! Ceilings that no command raises: those that a board's firmware was built with, and those of a
+//! device that has been commissioned. It compares configurations; who may send which one is
+//! `link`'s business.
 
 use crate::config::{DacWidth, Device, Mechanism};
 use crate::kinematics::mm_per_count;
@@ -15,15 +16,16 @@ pub struct Ceilings {
     pub torque: MillinewtonMetres,
     /// The ceiling of the speed past which [`crate::event::Fault::Overspeed`] trips.
     pub speed: MillimetresPerSecond,
-    /// The most that a record may claim of the mechanism, which decides how stiff a wall may be (`stability.rs`): the most mass and dry
-    /// friction, and the least delay.
+    /// The most that a record may claim of the mechanism, which decides how stiff a wall may be
+    /// (`stability.rs`): the most mass and dry friction, and the least delay.
     pub mechanism: Mechanism,
     /// The board's converters, the narrower one first; one that is alone is there twice.
     pub converters: [DacWidth; 2],
 }
 
 impl Ceilings {
-    /// The ceilings of a device without a motor that could hurt anybody: all that [`crate::Plan`] takes.
+    /// The ceilings of a device without a motor that could hurt anybody: all that [`crate::Plan`]
+    /// takes.
     pub const VIRTUAL: Self = Self {
         torque: MillinewtonMetres(I16F16::MAX),
         speed: MillimetresPerSecond(I16F16::MAX),
@@ -31,9 +33,9 @@ impl Ceilings {
         converters: [DacWidth::BITS_8, DacWidth::BITS_12],
     };
 
-    /// Ceilings of so many whole mN·m and mm/s, and a mechanism like those that the stiffness of walls was tested with: at most 200 g and 1 N
-    /// along the needle, at least 30 µs from the reading of the encoder to the torque, of which 20 are the wait for the converter's
-    /// instant.
+    /// Ceilings of so many whole mN·m and mm/s, and a mechanism like those that the stiffness of
+    /// walls was tested with: at most 200 g and 1 N along the needle, at least 30 µs from the
+    /// reading of the encoder to the torque, of which 20 are the wait for the converter's instant.
     pub const fn new(torque_mnm: i16, speed_mm_per_s: i16) -> Self {
         Self {
             torque: MillinewtonMetres(I16F16::from_bits((torque_mnm as i32) << 16)),
@@ -71,10 +73,11 @@ impl Ceilings {
     }
 }
 
-/// Returns why a device that was commissioned as `before` may not become `after` without being commissioned again: the first
-/// value that commissioning found and that is another one, or a ceiling that is higher. What only makes the device gentler,
-/// or shows in nothing but the feel, may change. Less mass and dry friction and more delay are gentler: with them a wall may be
-/// less stiff (`stability.rs`).
+/// Returns why a device that was commissioned as `before` may not become `after` without being
+/// commissioned again: the first value that commissioning found and that is another one, or a
+/// ceiling that is higher. What only makes the device gentler, or shows in nothing but the feel,
+/// may change. Less mass and dry friction and more delay are gentler: with them a wall may be less
+/// stiff (`stability.rs`).
 pub fn changed(before: &Device, after: &Device) -> Option<Field> {
     let (old, new) = (&before.limits, &after.limits);
     let (moved, moves) = (&before.mechanism, &after.mechanism);

@@ -1,5 +1,5 @@
-//! The configuration that a person writes, in physical units. It travels over the link and is kept in flash; it says nothing about
-//! whether it is safe: only [`crate::plan::Plan::new`] does.
+//! The configuration that a person writes, in physical units. It travels over the link and is kept
+//! in flash; it says nothing about whether it is safe: only [`crate::plan::Plan::new`] does.
 
 use crate::compensation::Compensation;
 use crate::units::{
@@ -16,7 +16,8 @@ pub use crate::law::{
 };
 pub use crate::tissue::{Layer, MAX_LAYERS, Parabola, SPRING_BACK, Tissue, Vessel, Wall};
 
-/// All that the control law needs to know: the two parts, which are sent and stored apart. Neither holds the other's keys.
+/// All that the control law needs to know: the two parts, which are sent and stored apart. Neither
+/// holds the other's keys.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Config {
     /// The device, as found when it was commissioned; it changes rarely.
@@ -32,8 +33,8 @@ impl Config {
     }
 }
 
-/// The device as it was built and commissioned: roller, encoder, converter, and what it never exceeds, whoever the patient
-/// is.
+/// The device as it was built and commissioned: roller, encoder, converter, and what it never
+/// exceeds, whoever the patient is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Device {
     /// Radius of the roller on the motor shaft, 4–25 mm.
@@ -42,16 +43,18 @@ pub struct Device {
     pub counts_per_turn: u16,
     /// The encoder counts down where the needle goes in.
     pub encoder_reversed: bool,
-    /// Torque at the converter's full scale, from the amplifier's gain and the motor's torque constant. A calibration value.
+    /// Torque at the converter's full scale, from the amplifier's gain and the motor's torque
+    /// constant. A calibration value.
     pub full_scale_torque: MillinewtonMetres,
     /// The converter.
     pub dac: DacWidth,
-    /// The code at which the amplifier gives no torque, in codes past mid-scale: at most a sixteenth of the converter's span.
+    /// The code at which the amplifier gives no torque, in codes past mid-scale: at most a
+    /// sixteenth of the converter's span.
     pub dac_zero: i16,
     /// A code above zero drives the needle outwards.
     pub motor_reversed: bool,
-    /// The reading of the needle's tilt when the needle is laid on the skin: −1,571 to 1,571 mrad. Measured tilt less this is the angle
-    /// to the skin.
+    /// The reading of the needle's tilt when the needle is laid on the skin: −1,571 to 1,571 mrad.
+    /// Measured tilt less this is the angle to the skin.
     pub skin_tilt: Milliradians,
     /// The limits that the device never exceeds.
     pub limits: SafetyConfig,
@@ -59,13 +62,15 @@ pub struct Device {
     pub speed: SpeedMethod,
     /// Damping added everywhere, for stability.
     pub damping: Damping,
-    /// Damping added only while the tissue would give back more energy than it was given; 0 leaves the observer off.
+    /// Damping added only while the tissue would give back more energy than it was given; 0 leaves
+    /// the observer off.
     pub passivity_damping: Damping,
     /// The moving mechanism, which decides how stiff a wall may be.
     pub mechanism: Mechanism,
     /// The compensation of the device's own forces.
     pub compensation: Compensation,
-    /// True if the values above were found on this device. Without it no torque is given but [`crate::excitation::GENTLE_TORQUE`].
+    /// True if the values above were found on this device. Without it no torque is given but
+    /// [`crate::excitation::GENTLE_TORQUE`].
     pub commissioned: bool,
 }
 
@@ -76,12 +81,14 @@ pub struct Mechanism {
     pub mass: Grams,
     /// Dry friction along the needle, 0–10 N.
     pub dry_friction: Newtons,
-    /// From the reading of the encoder to the torque at the shaft, beside the time for which a code is held, 20–1,000 µs.
+    /// From the reading of the encoder to the torque at the shaft, beside the time for which a code
+    /// is held, 20–1,000 µs.
     pub delay_us: u16,
 }
 
 impl Default for Mechanism {
-    /// The mechanism that the design notes assume: 30 g, 0.06 N, and a tick for converter and amplifier.
+    /// The mechanism that the design notes assume: 30 g, 0.06 N, and a tick for converter and
+    /// amplifier.
     fn default() -> Self {
         Self {
             mass: Grams(I16F16::from_bits(30 << 16)),
@@ -91,14 +98,14 @@ impl Default for Mechanism {
     }
 }
 
-/// Whom the needle goes into: tissue, its law of force, and limits of its own, which may be narrower than the device's and
-/// never wider.
+/// Whom the needle goes into: tissue, its law of force, and limits of its own, which may be
+/// narrower than the device's and never wider.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Patient {
     /// Largest force at the roller, where it is to be less than what the device gives.
     pub largest_force: Option<Newtons>,
-    /// All forces of the law are given to the hand at this share, 0.1–1: a declared scale where they are more than the motor
-    /// has.
+    /// All forces of the law are given to the hand at this share, 0.1–1: a declared scale where
+    /// they are more than the motor has.
     pub scale: I16F16,
     /// The law of force.
     pub law: Law,
@@ -113,7 +120,8 @@ pub struct Patient {
 #[serde(try_from = "WidthCode", into = "WidthCode")]
 pub struct DacWidth(u8);
 
-/// A width as it is sent and stored: the number of its bits, but for the two that were the only ones before they were numbers.
+/// A width as it is sent and stored: the number of its bits, but for the two that were the only
+/// ones before they were numbers.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 struct WidthCode(u8);
 
@@ -144,7 +152,7 @@ impl From<DacWidth> for WidthCode {
     }
 }
 
-/// A number of bits that is no converter's.
+/// A number of bits that no converter has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct NoWidth(pub u8);
 
@@ -202,7 +210,8 @@ pub struct SafetyConfig {
     pub slew_per_tick: MillinewtonMetres,
     /// Time over which torque fades in after a start, 10–5,000 ms.
     pub fade_in_ms: u16,
-    /// Largest movement in one tick, in counts: the ceiling of speed; more is an encoder fault. 2–1,000.
+    /// Largest movement in one tick, in counts: the ceiling of speed; more is an encoder fault.
+    /// 2–1,000.
     pub max_counts_per_tick: u16,
     /// Largest depth; beyond it is a fault. 1–500 mm.
     pub travel: Millimetres,
@@ -213,8 +222,8 @@ pub struct SafetyConfig {
 }
 
 impl Default for Device {
-    /// A 10 mm roller on the motor and encoder of Paper 001 and a 12-bit converter, not commissioned: the device that a board without a
-    /// record of its own assumes.
+    /// A 10 mm roller on the motor and encoder of Paper 001 and a 12-bit converter, not
+    /// commissioned: the device that a board without a record of its own assumes.
     fn default() -> Self {
         let mm = |whole: i32| Millimetres(I16F16::from_bits(whole << 16));
         // 28.8 mN·m.
@@ -241,7 +250,8 @@ impl Default for Device {
             },
             speed: SpeedMethod::Window,
             damping: Damping::default(),
-            // 0.005 N·s/mm quietens a 7 N/mm wall under a light hand (`a_stiff_wall_rings_without_the_observer`).
+            // 0.005 N·s/mm quietens a 7 N/mm wall under a light hand
+            // (`a_stiff_wall_rings_without_the_observer`).
             passivity_damping: Damping(fixed::types::I8F24::from_bits(83_886)),
             mechanism: Mechanism::default(),
             compensation: Compensation::NONE,
@@ -251,16 +261,17 @@ impl Default for Device {
 }
 
 impl Device {
-    /// The default device as a simulated one, whose wiring is known: it gives torque without being commissioned first. Never save it
-    /// on a board.
+    /// The default device as a simulated one, whose wiring is known: it gives torque without being
+    /// commissioned first. Never save it on a board.
     pub fn commissioned_virtual() -> Self {
         Self { commissioned: true, ..Self::default() }
     }
 }
 
 impl Default for Patient {
-    /// An adult's antecubital vein, as `force-models` in the design notes gives it: skin 9 mm²/N to 1.0 N at 3 mm, vein
-    /// 4 mm²/N to 0.56 N at 1.5 mm, 4.8 mm deep and 3.0 mm across, perpendicular to the skin.
+    /// An adult's antecubital vein, as `force-models` in the design notes gives it: skin 9 mm²/N to
+    /// 1.0 N at 3 mm, vein 4 mm²/N to 0.56 N at 1.5 mm, 4.8 mm deep and 3.0 mm across,
+    /// perpendicular to the skin.
     fn default() -> Self {
         let mm = |bits: i32| Millimetres(I16F16::from_bits(bits));
         let wall = |compliance: i32, puncture: i32, vertex: i32, relief: i32| Wall {

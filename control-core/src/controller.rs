@@ -1,5 +1,5 @@
-//! The tick: strings the stages together and holds the operating mode. The device and the simulator call this and
-//! nothing else.
+//! The tick: strings the stages together and holds the operating mode. The device and the simulator
+//! call this and nothing else.
 
 mod exchange;
 mod torque;
@@ -29,8 +29,9 @@ const LOOK_TURN: u32 = 4;
 
 /// The control law with its memory, but for the segments that play.
 #[derive(Clone, Debug)]
-// In this order: on the board the longest tick takes some 27 instructions fewer than in the compiler's own, because the nearer a field is to
-// the beginning, the fewer instructions it takes to reach it.
+// In this order: on the board the longest tick takes some 27 instructions fewer than in the
+// compiler's own, because the nearer a field is to the beginning, the fewer instructions it takes
+// to reach it.
 #[repr(C)]
 pub(crate) struct Core {
     mode: Mode,
@@ -259,7 +260,8 @@ impl Core {
         }
     }
 
-    /// Returns the tissue and the force of the tip at `depth`. During an excitation nobody's hand is on the needle, and nobody feels tissue.
+    /// Returns the tissue and the force of the tip at `depth`. During an excitation nobody's hand
+    /// is on the needle, and nobody feels tissue.
     fn meet(
         &mut self,
         tilt: Milliradians,

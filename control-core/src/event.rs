@@ -67,7 +67,8 @@ pub enum Fault {
     StoredConfig = 9,
     /// The encoder does not count, neither under torque nor when the torque is taken away.
     EncoderFrozen = 10,
-    /// The needle speeds up against the motor as no hand makes it: the motor's leads or the encoder's channels are swapped.
+    /// The needle speeds up against the motor as no hand makes it: the motor's leads or the
+    /// encoder's channels are swapped.
     WrongWay = 11,
     /// The needle is faster than a hand moves it.
     Overspeed = 12,

@@ -1,8 +1,9 @@
-//! Signals that separate one physical effect from another (`characterise`). The device plays them with no hand on
-//! the needle: a reference that a soft position servo follows, a torque on top, or both. The safety limits stay in force.
+//! Signals that separate one physical effect from another (`characterise`). The device plays them
+//! with no hand on the needle: a reference that a soft position servo follows, a torque on top, or
+//! both. The safety limits stay in force.
 //!
-//! The reference is a pure function of the signal and the tick, so the PC can write down what the servo was asked to
-//! follow: it plays the same [`Reference`].
+//! The reference is a pure function of the signal and the tick, so the PC can write down what the
+//! servo was asked to follow: it plays the same [`Reference`].
 
 mod player;
 mod reference;
@@ -36,7 +37,8 @@ pub struct Excitation {
     pub servo: Servo,
     /// Largest distance from where it began, 1–1,000 mm along the roller; beyond it is a fault.
     pub travel: Millimetres,
-    /// With what the device feeds forward: shows what is left of the mechanism. Without, the mechanism as it is.
+    /// With what the device feeds forward: shows the rest of the mechanism. Without, the mechanism
+    /// as it is.
     pub compensated: bool,
 }
 
@@ -52,8 +54,8 @@ pub struct Servo {
 /// The signals, each for the effects that it distinguishes.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Signal {
-    /// Constant speeds, each there and back, each `ratio` times the one before; begins again after the last. Tells
-    /// Stribeck friction from quadratic drag and viscosity.
+    /// Constant speeds, each there and back, each `ratio` times the one before; begins again after
+    /// the last. Tells Stribeck friction from quadratic drag and viscosity.
     SpeedStaircase {
         /// The first speed.
         slowest: MillimetresPerSecond,
@@ -64,15 +66,16 @@ pub enum Signal {
         /// Time at a speed, one way, 50–10,000 ms.
         dwell_ms: u16,
     },
-    /// There and back at one speed, over many turns. Shows what depends on the angle and on the travel.
+    /// There and back at one speed, over many turns. Shows what depends on the angle and on the
+    /// travel.
     Triangle {
         /// From one end to the other.
         stroke: Millimetres,
         /// Speed.
         speed: MillimetresPerSecond,
     },
-    /// Reversals of growing amplitude: there and back over each, each `ratio` times the one before; begins again after
-    /// the last. Tells presliding from backlash.
+    /// Reversals of growing amplitude: there and back over each, each `ratio` times the one before;
+    /// begins again after the last. Tells presliding from backlash.
     ReversalLadder {
         /// The first amplitude.
         smallest: Millimetres,
@@ -83,14 +86,16 @@ pub enum Signal {
         /// Speed.
         speed: MillimetresPerSecond,
     },
-    /// Sines of equal torque around the reference at rest, with Schroeder's phases. Tells delay from electrical lag.
+    /// Sines of equal torque around the reference at rest, with Schroeder's phases. Tells delay
+    /// from electrical lag.
     Multisine {
         /// Amplitude of each sine.
         torque: MillinewtonMetres,
         /// Frequencies in Hz.
         frequencies: Vec<u16, MAX_LINES>,
     },
-    /// Torque that rises from zero until the motor breaks away, there and back. Shows dry friction at rest.
+    /// Torque that rises from zero until the motor breaks away, there and back. Shows dry friction
+    /// at rest.
     BreakawayRamps {
         /// Largest torque.
         torque: MillinewtonMetres,
@@ -102,8 +107,8 @@ pub enum Signal {
 }
 
 impl Excitation {
-    /// True if a device may play it whose wiring is not yet known: no servo, which would drive the wrong way, and
-    /// no more than [`GENTLE_TORQUE`].
+    /// True if a device may play it whose wiring is not yet known: no servo, which would drive the
+    /// wrong way, and no more than [`GENTLE_TORQUE`].
     pub fn is_gentle(&self) -> bool {
         let torque = match &self.signal {
             Signal::Multisine { torque, frequencies } => {
@@ -146,7 +151,8 @@ impl Excitation {
 }
 
 impl Signal {
-    /// Refuses a value that no device may play, a way of more than `travel` in mm, and a torque of more than `most` in mN·m.
+    /// Refuses a value that no device may play, a way of more than `travel` in mm, and a torque of
+    /// more than `most` in mN·m.
     fn check(&self, travel: I16F16, most: I16F16) -> Result<(), Refusal> {
         let torque = |t: I16F16| within(Field::TorqueLimit, t, I16F16::ZERO, most);
         let length = |l: I16F16| within(Field::Travel, l, thousandth(10), travel);

@@ -1,5 +1,5 @@
-//! Friction along the needle inside tissue (Paper 001, eq. 2): as printed, as a clamped proxy that holds, and as one with a static and a
-//! dynamic level.
+//! Friction along the needle inside tissue (Paper 001, eq. 2): as printed, as a clamped proxy that
+//! holds, and as one with a static and a dynamic level.
 
 use crate::anchor::Anchor;
 use crate::math::{exp, saturating_multiply, saturating_product, truncating_product};
@@ -28,15 +28,17 @@ pub(crate) enum Law {
     StickSlip { stiffness: Stiffness, inverse_stiffness: I16F16, sliding: I16F16 },
 }
 
-/// A needle that has not slid for so many ticks sticks again: 20 ms. One that is slower than a count in that time (0.8 mm/s at 16 µm a
-/// count) therefore counts as at rest from one count to the next.
+/// A needle that has not slid for so many ticks sticks again: 20 ms. One that is slower than a
+/// count in that time (0.8 mm/s at 16 µm a count) therefore counts as at rest from one count to the
+/// next.
 const STICKS_AFTER: u16 = 200;
 
 /// The point at which the needle is held.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Hold {
     anchor: Anchor,
-    /// Ticks for which the needle still counts as sliding; 0 is at rest. Of [`Law::StickSlip`] alone.
+    /// Ticks for which the needle still counts as sliding; 0 is at rest. Of [`Law::StickSlip`]
+    /// alone.
     sliding_ticks: u16,
 }
 
@@ -50,8 +52,8 @@ impl Hold {
 }
 
 impl Law {
-    /// One tick inside tissue. `inserted` is the length past the entry, `limit` the friction limit that the layers make
-    /// there, for the law that asks.
+    /// One tick inside tissue. `inserted` is the length past the entry, `limit` the friction limit
+    /// that the layers make there, for the law that asks.
     pub(crate) fn tick(
         &self,
         Hold { anchor, sliding_ticks }: &mut Hold,
@@ -65,7 +67,8 @@ impl Law {
                 // 1/S_f1 is at most 1.
                 let levels = truncating_product(inserted.0.to_bits(), per_level_length.to_bits(), 30);
                 let level = exp(I16F16::from_bits(levels)).min(*level_cap);
-                // A metre, further than the needle is long: with levels up to 32 and slopes up to 7 N/mm all fits.
+                // A metre, further than the needle is long: with levels up to 32 and slopes up to 7
+                // N/mm all fits.
                 let stretch = anchor.stretch(depth).to_bits().clamp(-1 << 26, (1 << 26) - 1);
                 let levelled = saturating_product(stretch, level.to_bits(), 16);
                 let force = I16F16::from_bits(saturating_product(levelled, stiffness.0.to_bits(), 16));

@@ -9,13 +9,15 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[repr(u8)]
 pub enum Interlock {
-    /// The supply is below the level at which the core surely runs, or no brown-out reset guards it.
+    /// The supply is below the level at which the core surely runs, or no brown-out reset guards
+    /// it.
     Supply = 0,
     /// The emergency stop's loop is open: pressed, or its wire is off.
     EmergencyStop = 1,
     /// The amplifier does not say that it is ready.
     AmplifierNotReady = 2,
-    /// The amplifier's enable line, or the current that it measures, is on although it was switched off.
+    /// The amplifier's enable line, or the current that it measures, is on although it was switched
+    /// off.
     AmplifierStuckOn = 3,
     /// An encoder wire is off.
     EncoderWire = 4,
@@ -48,7 +50,8 @@ impl Interlock {
             Self::AmplifierNotReady => Fault::AmplifierNotReady,
             Self::AmplifierStuckOn => Fault::AmplifierStuckOn,
             Self::EncoderWire => Fault::EncoderWire,
-            // Nobody begins to save while torque is on; the last two keep a device from being started and come at no other time.
+            // Nobody begins to save while torque is on; the last two keep a device from being
+            // started and come at no other time.
             Self::Saving | Self::NotCommissioned | Self::NotZeroed => Fault::Overrun,
         }
     }

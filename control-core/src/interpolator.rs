@@ -1,13 +1,16 @@
-//! Interpolates between two counts of the encoder: the needle's place, and its speed without the steps of a window of counts.
+//! Interpolates between two counts of the encoder: the needle's place, and its speed without the
+//! steps of a window of counts.
 //!
-//! At an edge the place is known: the border of two counts. From there on it moves with the steady speed and never leaves its count. So the
-//! law sees a way without steps, late by nothing, and off by half a count at most.
+//! At an edge the place is known: the border of two counts. From there on it moves with the steady
+//! speed and never leaves its count. So the law sees a way without steps, late by nothing, and off
+//! by half a count at most.
 
 use crate::math::saturating_product;
 use crate::units::{Millimetres, MillimetresPerSecond};
 use fixed::types::I16F16;
 
-/// The steady speed follows with a time constant of 2^9 ticks, 51 ms: a count in a window is 1.2 mm/s, and a table over speed would make a buzz of it.
+/// The steady speed follows with a time constant of 2^9 ticks, 51 ms: a count in a window is 1.2
+/// mm/s, and a table over speed would make a buzz of it.
 const STEADY: u32 = 9;
 /// A tick in s, times 2^14, in Q24: from mm/s in Q16 to mm in Q30.
 const PER_TICK_Q24: i32 = 27_487_791;
@@ -23,8 +26,9 @@ pub(crate) struct Interpolator {
 }
 
 impl Interpolator {
-    /// One tick at `depth`, the place of a count, with `speed` from a window; a count is this long. Between counts, and the steady speed. A
-    /// needle that goes evenly is on average where its counts say.
+    /// One tick at `depth`, the place of a count, with `speed` from a window; a count is this long.
+    /// Between counts, and the steady speed. A needle that goes evenly is on average where its
+    /// counts say.
     pub(crate) fn tick(
         &mut self,
         depth: Millimetres,

@@ -15,7 +15,8 @@ const EDGE_SPACING_TICKS: u32 = WINDOW_TICKS / EDGES as u32;
 /// No edge for this long is rest: 0.1 s.
 const REST_TICKS: u32 = TICK_HZ / 10;
 
-/// The estimator of speed. One count a tick is 157 mm/s at a 10 mm roller: counts are never differenced tick by tick.
+/// The estimator of speed. One count a tick is 157 mm/s at a 10 mm roller: counts are never
+/// differenced tick by tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum SpeedMethod {
     /// Counts over the last [`WINDOW_TICKS`] ticks.
@@ -70,11 +71,14 @@ impl Scale {
 
 /// Ticks from one look at the movement to the next.
 pub(crate) const LOOK_TICKS: u32 = 16;
-/// A needle that has not come this far has not changed its direction: 0.25 mm in Q16, more than a hand at rest trembles.
+/// A needle that has not come this far has not changed its direction: 0.25 mm in Q16, more than a
+/// hand at rest trembles.
 const TURNED: u32 = 1 << 14;
-/// A needle that has not gone on for this many looks rests: 0.25 s, with which 0.1 mm/s is still a movement.
+/// A needle that has not gone on for this many looks rests: 0.25 s, with which 0.1 mm/s is still a
+/// movement.
 const QUIET_LOOKS: u32 = 2_500 / LOOK_TICKS;
-/// A needle that has not gone on for this many looks, 20 ms, with 16 µm a count slower than 0.8 mm/s, has stopped …
+/// A needle that has not gone on for this many looks, 20 ms, with 16 µm a count slower than 0.8
+/// mm/s, has stopped …
 const STOPPED_LOOKS: u32 = 200 / LOOK_TICKS;
 /// … unless it has come back this far by then, in Q16: 0.1 mm.
 const TURNING: u32 = 6_554;
@@ -88,8 +92,8 @@ pub(crate) enum Direction {
     Out,
 }
 
-/// Tells a movement from a rest by the way that the needle goes, not by its speed: one count in a window of the speed is 1.2 mm/s
-/// already, and a hand at rest trembles as fast.
+/// Tells a movement from a rest by the way that the needle goes, not by its speed: one count in a
+/// window of the speed is 1.2 mm/s already, and a hand at rest trembles as fast.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Movement {
     direction: Direction,
@@ -116,7 +120,8 @@ impl Movement {
         self.direction
     }
 
-    /// True if the needle had stopped by the last look: earlier than it rests, and not while it turns round.
+    /// True if the needle had stopped by the last look: earlier than it rests, and not while it
+    /// turns round.
     pub(crate) fn has_stopped(&self) -> bool {
         self.has_stopped
     }
@@ -140,8 +145,8 @@ impl Movement {
     }
 }
 
-/// `dividend / divisor` to 20 bits or more for a divisor below 2^11, saturating: the board divides 32 bits in one
-/// instruction and 64 in a hundred.
+/// `dividend / divisor` to 20 bits or more for a divisor below 2^11, saturating: the board divides
+/// 32 bits in one instruction and 64 in a hundred.
 fn quotient(dividend: u64, divisor: u32) -> i32 {
     let (high, low) = ((dividend >> 32) as u32, dividend as u32);
     let excess = 32 - high.leading_zeros();
@@ -228,8 +233,8 @@ impl SpeedEstimator {
         if silent > REST_TICKS {
             return MillimetresPerSecond::default();
         }
-        // Waiting for the next edge bounds the speed from above: it is less than a count in `silent`, however many counts
-        // came before.
+        // Waiting for the next edge bounds the speed from above: it is less than a count in
+        // `silent`, however many counts came before.
         let Edge { tick, count } = self.span;
         if silent.wrapping_mul(count.unsigned_abs()) > tick {
             scale.speed(count.signum(), silent)
@@ -254,8 +259,8 @@ impl SpeedEstimator {
         }
     }
 
-    /// Lets go of the oldest edge once it has left the window; never of the last one. Stored edges are more than a tick
-    /// apart: one a tick is enough.
+    /// Lets go of the oldest edge once it has left the window; never of the last one. Stored edges
+    /// are more than a tick apart: one a tick is enough.
     fn forget_edge(&mut self) {
         let age = self.now.wrapping_sub(self.edge(self.oldest_edge).tick);
         let next = self.oldest_edge.wrapping_add(1);
@@ -339,7 +344,7 @@ mod tests {
         // 0.08 mm at 10 Hz is up to 5 mm/s.
         let tremor = |tick: u32| 0.08 * (f64::from(tick) * 0.006_283).sin();
         assert_eq!(directions((0..100_000).map(tremor)), [100_000, 0, 0]);
-        // In at 3 mm/s, then held: a quarter of a second later it rests, for good.
+        // In at 3 mm/s, then held: a quarter of a second later it rests permanently.
         let held = directions((0..50_000).map(|tick| 3e-4 * f64::from(tick.min(10_000)) + tremor(tick)));
         assert!(held[0] > 35_000 && held[2] == 0, "{held:?}");
     }
@@ -368,7 +373,8 @@ mod tests {
         near(899, 156.25 / 100.0);
     }
 
-    /// A needle that stops at once: what has not moved by a count in a time is slower than a count in that time.
+    /// A needle that stops at once: what has not moved by a count in a time is slower than a count
+    /// in that time.
     #[test]
     fn after_an_abrupt_stop_speed_is_below_one_count_in_that_time() {
         // Three counts in four ticks are 117 mm/s; a count a tick is 156.25.

@@ -1,12 +1,14 @@
-//! The computation that the device repeats ten thousand times a second: encoder count in, DAC code out.
+//! The computation that the device repeats ten thousand times a second: encoder count in, DAC code
+//! out.
 //!
-//! A tick, as data: count → [`kinematics`] (depth, speed) → [`anatomy`] (which layers, given the angle) → `law` (the
-//! force law) → torque, with what [`compensation`] feeds forward beside it → [`safety`] (limit, fade-in, slew) → DAC code.
-//! [`controller::Controller`] strings them together and holds the
-//! operating mode; [`config`] is what a person writes and [`plan`] what may run, or the reason why not.
+//! A tick, as data: count → [`kinematics`] (depth, speed) → [`anatomy`] (which layers, given the
+//! angle) → `law` (the force law) → torque, with what [`compensation`] feeds forward beside it →
+//! [`safety`] (limit, fade-in, slew) → DAC code. [`controller::Controller`] strings them together
+//! and holds the operating mode; [`config`] is what a person writes and [`plan`] what may run, or
+//! the reason why not.
 //!
-//! This crate may not touch hardware, allocate, block, use floating point or `unsafe`. The board and the simulator run
-//! the very same code.
+//! This crate may not touch hardware, allocate, block, use floating point or `unsafe`. The board
+//! and the simulator run the very same code.
 #![no_std]
 // The tick has no floating point and cannot panic: lints hold the crate to it.
 #![deny(

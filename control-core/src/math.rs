@@ -1,5 +1,5 @@
-//! Fixed-point helpers that the laws share. A product here is one multiplication and a handful of moves on the board; the
-//! general conversions of `fixed` take forty instructions.
+//! Fixed-point helpers that the laws share. A product here is one multiplication and a handful of
+//! moves on the board; the general conversions of `fixed` take forty instructions.
 
 use crate::units::Milliradians;
 use fixed::types::{I2F30, I8F24, I16F16};
@@ -13,7 +13,7 @@ const EXP2_Q30: [i32; 6] = [1_073_741_824, 744_261_118, 257_941_248, 59_597_086,
 pub(crate) fn exp(x: I16F16) -> I16F16 {
     let x = x.clamp(I16F16::ZERO, I16F16::from_bits(8 << 16));
     let power = truncating_product(x.to_bits(), LOG2_E.to_bits(), 30);
-    // Round(x·log2(e)), 0 to 12; what is left of it lies in [−0.5, 0.5).
+    // Round(x·log2(e)), 0 to 12; the rest is in [−0.5, 0.5).
     let whole = (power + (1 << 15)) >> 16;
     let fraction_q32 = (power - (whole << 16)) << 16;
     let mantissa_q30 = exp2_q30(fraction_q32);
@@ -67,7 +67,8 @@ fn exp2_q30(fraction_q32: i32) -> i32 {
     EXP2_Q30.iter().rev().fold(0, |sum, coefficient| coefficient + upper_half(sum, fraction_q32))
 }
 
-/// `part / whole` in Q28 for `0 ≤ part ≤ whole`, `whole` above zero, to 2e-5 of itself: two divisions of 32 bits.
+/// `part / whole` in Q28 for `0 ≤ part ≤ whole`, `whole` above zero, to 2e-5 of itself: two
+/// divisions of 32 bits.
 pub(crate) fn share(part: i32, whole: i32) -> i32 {
     let whole = whole.max(1).cast_unsigned();
     let places = whole.leading_zeros();
@@ -82,8 +83,8 @@ pub(crate) fn saturating_times(a: I16F16, b: I2F30) -> I16F16 {
     I16F16::from_bits(saturating_product(a.to_bits(), b.to_bits(), 30))
 }
 
-/// `a · b`, towards −∞; where it does not fit, a number of the same sign less than 1 from the largest there is: half the
-/// instructions of the nearest.
+/// `a · b`, towards −∞; where it does not fit, a number of the same sign less than 1 from the
+/// largest there is: half the instructions of the nearest.
 pub(crate) fn saturating_multiply(a: I16F16, b: I16F16) -> I16F16 {
     let wide = i64::from(a.to_bits()) * i64::from(b.to_bits());
     let whole = ((wide >> 32) as i32).clamp(-1 << 15, (1 << 15) - 1);
@@ -95,8 +96,9 @@ pub(crate) fn saturating_product(a: i32, b: i32, places: u32) -> i32 {
     saturate((i64::from(a) * i64::from(b)) >> places)
 }
 
-/// `a · b` without its last `places` bits, towards −∞, where it is known to fit: half the instructions of [`saturating_product`].
-/// Where it did not fit it could have the other sign: what becomes the motor's torque is a product that saturates.
+/// `a · b` without its last `places` bits, towards −∞, where it is known to fit: half the
+/// instructions of [`saturating_product`]. Where it did not fit it could have the other sign: what
+/// becomes the motor's torque is a product that saturates.
 pub(crate) fn truncating_product(a: i32, b: i32, places: u32) -> i32 {
     let wide = (i64::from(a) * i64::from(b)) >> places;
     debug_assert!(i32::try_from(wide).is_ok(), "{a} · {b} >> {places}");

@@ -1,10 +1,12 @@
-//! Watches the energy that goes in and out through the needle, of walls and of friction apart. An element that gives back
-//! more than it was given is active and rings; then damping takes the surplus away from its force (time-domain passivity
-//! control, Hannaford and Ryu 2002). It may reduce a force that pushes the needle along and never turns it round.
+//! Watches the energy that goes in and out through the needle, of walls and of friction apart. An
+//! element that gives back more than it was given is active and rings; then damping takes the
+//! surplus away from its force (time-domain passivity control, Hannaford and Ryu 2002). It may
+//! reduce a force that pushes the needle along and never turns it round.
 //!
-//! Apart, because friction takes energy all the way in and gives none of it back: counted with the walls it would be a credit
-//! that they could spend for seconds. What a wall has stored is gone when it gives way; of what friction took no more can come
-//! back than its hold stores. What counts is the force that the motor gave, after every limit.
+//! Apart, because friction takes energy all the way in and gives none of it back: counted with the
+//! walls it would be a credit that they could spend for seconds. What a wall has stored is gone
+//! when it gives way; of what friction took no more can come back than its hold stores. What counts
+//! is the force that the motor gave, after every limit.
 
 use crate::TICK_HZ;
 use crate::math::{saturating_product, truncating_product};
@@ -13,7 +15,8 @@ use fixed::types::{I8F24, I16F16};
 
 /// Below this an element stores nothing worth counting, and a new count begins: 5 mN.
 const NOTHING: i32 = 328;
-/// Ticks over which the speed of a bounce is taken: 0.8 ms, for the speed window is too slow for it.
+/// Ticks over which the speed of a bounce is taken: 0.8 ms, for the speed window is too slow for
+/// it.
 const BOUNCE_TICKS: usize = 8;
 
 /// The observer's damping ready for the tick; none leaves it off.
@@ -33,7 +36,8 @@ impl BounceDamping {
 
 /// The most that a hold of friction stores: 1 N at 1 N/mm.
 const FRICTION_STORE: Energy = Energy(1 << (ENERGY_PLACES - 1));
-/// No further than this the needle goes in a tick, a step less than 1 mm: that would be 10 m/s, which is a fault.
+/// No further than this the needle goes in a tick, a step less than 1 mm: that would be 10 m/s,
+/// which is a fault.
 const LARGEST_WAY: i32 = (1 << 16) - 1;
 /// Binary places of an [`Energy`].
 const ENERGY_PLACES: u32 = 20;
@@ -94,7 +98,8 @@ impl Observer {
         Self { depth, depths: [depth; BOUNCE_TICKS], ..Self::default() }
     }
 
-    /// One tick in which a wall may have given way: the force to give instead of `wanted`, and whether damping was added.
+    /// One tick in which a wall may have given way: the force to give instead of `wanted`, and
+    /// whether damping was added.
     pub(crate) fn tick(
         &mut self,
         damping: BounceDamping,
@@ -113,7 +118,8 @@ impl Observer {
         (wanted.total(), false)
     }
 
-    /// The motor gave so much less than the force of the tick, N, because of a limit: the walls gave it the less.
+    /// The motor gave so much less than the force of the tick, N, because of a limit: the walls
+    /// gave it the less.
     pub(crate) fn held_back(&mut self, missing: I16F16) {
         let walls = self.given.walls.0;
         let left = walls.saturating_sub(missing);
@@ -165,10 +171,11 @@ fn counted(energy: Energy, given: Newtons, wanted: Newtons, way: i32) -> Energy 
     if is_nothing { Energy::default() } else { energy.with_work(given, way) }
 }
 
-/// The energy that the compensation has put into the mechanism, less the energy that the found friction has dissipated, in
-/// mN·m·counts in Q16. Waves by angle return what they took, up to what they store; friction compensation puts in less than friction
-/// dissipates. An excess over that store is a surplus that makes the needle ring: then nothing is given along the way of
-/// the needle until friction has taken it. A weight does not count: it is the same on the way in and out.
+/// The energy that the compensation has put into the mechanism, less the energy that the found
+/// friction has dissipated, in mN·m·counts in Q16. Waves by angle return what they took, up to what
+/// they store; friction compensation puts in less than friction dissipates. An excess over that
+/// store is a surplus that makes the needle ring: then nothing is given along the way of the needle
+/// until friction has taken it. A weight does not count: it is the same on the way in and out.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Account {
     injected: i64,
@@ -177,8 +184,8 @@ pub(crate) struct Account {
 }
 
 impl Account {
-    /// One tick in which the needle moved by `way` counts under `before`, against `friction` of the mechanism (mN·m): what to
-    /// give of `wanted`, and whether something was held back.
+    /// One tick in which the needle moved by `way` counts under `before`, against `friction` of the
+    /// mechanism (mN·m): what to give of `wanted`, and whether something was held back.
     pub(crate) fn allow(
         &mut self,
         store: i64,
@@ -188,7 +195,8 @@ impl Account {
         wanted: I16F16,
     ) -> (I16F16, bool) {
         if way != 0 {
-            // A needle that turns round meets the edge again that it has just passed, and has gone no way in between.
+            // A needle that turns round meets the edge again that it has just passed, and has gone
+            // no way in between.
             let has_turned = way.is_negative() != self.way.is_negative();
             let gone = if has_turned { way - way.signum() } else { way };
             self.way = way;
@@ -239,7 +247,8 @@ mod tests {
         Elements { walls: n(newtons), ..Elements::NONE }
     }
 
-    /// A wall that pushes the needle before it from the first tick on gives energy that nobody put in.
+    /// A wall that pushes the needle before it from the first tick on gives energy that nobody put
+    /// in.
     #[expect(clippy::float_arithmetic, reason = "a test")]
     fn pushed(force: f64, from: f64, step: f64, ticks: i32) -> (Observer, usize) {
         let mut observer = Observer::new(mm(from));

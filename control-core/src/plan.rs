@@ -1,5 +1,6 @@
-//! From a [`Config`] to a [`Plan`] the tick can run: everything is checked and every division done here. A configuration
-//! that is unstable, overflows or asks for more than the motor has is refused with the reason, never clamped.
+//! From a [`Config`] to a [`Plan`] the tick can run: everything is checked and every division done
+//! here. A configuration that is unstable, overflows or asks for more than the motor has is refused
+//! with the reason, never clamped.
 
 mod layers;
 
@@ -37,7 +38,8 @@ pub struct Plan {
     pub(crate) scale: Scale,
     pub(crate) anatomy: Anatomy,
     pub(crate) law: law::Plan,
-    /// Length by which a force of the law becomes the torque that is given: the roller's radius at the declared scale.
+    /// Length by which a force of the law becomes the torque that is given: the roller's radius at
+    /// the declared scale.
     pub(crate) lever: I16F16,
     /// 1/lever, 1/mm.
     pub(crate) per_lever: I16F16,
@@ -236,13 +238,15 @@ fn check_ceiling(config: &Config) -> Result<(), Refusal> {
     within(Field::LargestForce, force, milli(10), ceiling)
 }
 
-/// Returns the force of the torque limit at the roller, mN·m over mm being N, or less where the patient wants less.
+/// Returns the force of the torque limit at the roller, mN·m over mm being N, or less where the
+/// patient wants less.
 fn largest_force(config: &Config) -> I16F16 {
     let ceiling = config.device.limits.torque.0.saturating_div(config.device.roller_radius.0);
     config.patient.largest_force.map_or(ceiling, |force| force.0.min(ceiling))
 }
 
-/// The force that a law may ask for: more than the device gives where the scale that is declared makes it less.
+/// The force that a law may ask for: more than the device gives where the scale that is declared
+/// makes it less.
 fn largest_asked(config: &Config) -> I16F16 {
     largest_force(config).saturating_div(config.patient.scale)
 }

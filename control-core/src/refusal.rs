@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 /// The reason why a configuration may not run. `layer` counts from 0, the outermost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Refusal {
-    /// A value lies outside its range.
+    /// A value is outside its range.
     OutOfRange {
         /// The field.
         field: Field,
@@ -48,7 +48,8 @@ pub enum Refusal {
         /// The jump in N.
         force: I16F16,
     },
-    /// A rising parabola's vertex lies past contact, or a relief's before its puncture: the force would pull.
+    /// A rising parabola's vertex is past contact, or a relief's before its puncture: the force
+    /// would pull.
     WrongWay {
         /// The layer.
         layer: u8,
@@ -58,13 +59,13 @@ pub enum Refusal {
         /// The layer.
         layer: u8,
     },
-    /// A layer lies beyond the travel.
+    /// A layer is beyond the travel.
     BeyondTravel {
         /// The layer.
         layer: u8,
     },
-    /// The far wall of a vessel does not lie right below its near one, or there are two vessels, or none for what is said of
-    /// one.
+    /// The far wall of a vessel does not lie right below its near one, or there are two vessels, or
+    /// none for what is said of one.
     NoVessel {
         /// The layer that is out of place.
         layer: u8,
@@ -94,7 +95,8 @@ pub enum Refusal {
         /// The largest allowed torque, in mN·m.
         limit: I16F16,
     },
-    /// With the friction that a compensation leaves, the stiffness that the device allows would ring.
+    /// With the friction that a compensation leaves, the stiffness that the device allows would
+    /// ring.
     CompensationUnstable {
         /// The stiffness that the device allows, in N/mm.
         stiffness: I16F16,
@@ -120,7 +122,8 @@ macro_rules! fields {
             $($name,)*
         }
 
-        /// The key in the device's or the patient's file, or words with a unit if no key holds the value in this unit.
+        /// The key in the device's or the patient's file, or words with a unit if no key holds the
+        /// value in this unit.
         impl fmt::Display for Field {
             fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
                 f.write_str(match self {

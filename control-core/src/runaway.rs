@@ -1,24 +1,27 @@
-//! Checks that the needle moves as a hand and a correctly wired motor move it. Three checks, each every 0.8 ms,
-//! none of the force law: a fault of the wiring shows in the counts alone.
+//! Checks that the needle moves as a hand and a correctly wired motor move it. Three checks, each
+//! every 0.8 ms, none of the force law: a fault of the wiring shows in the counts alone.
 //!
-//! **Against the motor.** Where the motor's leads or the encoder's channels are swapped, what should hold the needle back
-//! drives it on: a needle that nobody holds speeds up against the torque by `torque/(radius·mass)`. That is looked for, with
-//! a mass of 13 to 60 g, and from 10 m/s² on: a hand that pushes against the torque carries its own mass along and takes
-//! its time (a stab that reaches 300 mm/s in 50 ms makes 6 m/s²). A wall that gives way leaves the hand's force over and
-//! the needle leaps as well, but there the torque falls first: while it is less than three quarters of what it was, no leap
-//! counts.
+//! **Against the motor.** Where the motor's leads or the encoder's channels are swapped, what
+//! should hold the needle back drives it on: a needle that nobody holds speeds up against the
+//! torque by `torque/(radius·mass)`. That is looked for, with a mass of 13 to 60 g, and from 10
+//! m/s² on: a hand that pushes against the torque carries its own mass along and takes its time (a
+//! stab that reaches 300 mm/s in 50 ms makes 6 m/s²). A wall that gives way leaves the hand's force
+//! over and the needle leaps as well, but there the torque falls first: while it is less than three
+//! quarters of what it was, no leap counts.
 //!
-//! During an excitation nobody's hand is on the needle, and the torque swings faster than a hand does. Then a rightly wired needle may go
-//! against it as well: a load that flies on through a gap knocks the motor on, and a drive that obeys late gives the torque
-//! of before. Either is over within 4 ms, while a servo whose motor is swapped drives the needle away for good.
+//! During an excitation nobody's hand is on the needle, and the torque swings faster than a hand
+//! does. Then a rightly wired needle may go against it as well: a load that flies on through a gap
+//! knocks the motor on, and a drive that obeys late gives the torque of before. Either is over
+//! within 4 ms, while a servo whose motor is swapped drives the needle away permanently.
 //!
 //! **Too fast.** Whatever drives it.
 //!
-//! **To and fro.** An encoder with one channel dead counts each edge of the other one up and then down again. So does a needle
-//! that a stiff wall throws to and fro over one edge, as fast as any: the wall's force steps with the count, and the less the
-//! needle moves the sooner it is back. Removing the step distinguishes the two: when counts go to and fro, the torque is
-//! held for 10 ms at the mean of both sides. A chatter then has nothing that throws it, and ends; a hand that moves on past a
-//! dead channel does not.
+//! **To and fro.** An encoder with one channel dead counts each edge of the other one up and then
+//! down again. So does a needle that a stiff wall throws to and fro over one edge, as fast as any:
+//! the wall's force steps with the count, and the less the needle moves the sooner it is back.
+//! Removing the step distinguishes the two: when counts go to and fro, the torque is held for 10 ms
+//! at the mean of both sides. A chatter then has nothing that throws it, and ends; a hand that
+//! moves on past a dead channel does not.
 
 use crate::TICK_HZ;
 use crate::event::Fault;
@@ -43,16 +46,18 @@ const HOLD_TICKS: u32 = 100;
 const COASTING_TURNS: u32 = 1;
 /// Looks in a row at which a needle must go as if it were driven: a knock of 40 mm/s is one.
 const DRIVEN_LOOKS: u32 = 2;
-/// The same under the servo of an excitation, 4 ms: longer than a late drive or a knock of the load.
+/// The same under the servo of an excitation, 4 ms: longer than a late drive or a knock of the
+/// load.
 const SERVO_DRIVEN_LOOKS: u32 = 5;
-/// Rounding to counts makes up to two of an acceleration: fewer counts than this are none.
+/// Rounding to counts makes up to two of an acceleration: fewer counts than this do not count.
 const LEAST_COUNTS: i32 = 5;
 
-/// A needle is too fast at this share of what an encoder that works may count in a tick: 0.4 m/s where that is 16 counts of
-/// 16 µm.
+/// A needle is too fast at this share of what an encoder that works may count in a tick: 0.4 m/s
+/// where that is 16 counts of 16 µm.
 const SLOWER: u32 = 6;
 
-/// The speed past which a needle is too fast that may move so many counts, each so many mm long, in a tick.
+/// The speed past which a needle is too fast that may move so many counts, each so many mm long, in
+/// a tick.
 pub(crate) fn fastest(mm_per_count: I2F30, max_counts_per_tick: u16) -> MillimetresPerSecond {
     let per_tick_q30 = i64::from(mm_per_count.to_bits()) * i64::from(max_counts_per_tick);
     let bits = (per_tick_q30 * i64::from(TICK_HZ / SLOWER)) >> 14;
@@ -71,7 +76,8 @@ pub(crate) struct Bounds {
 }
 
 impl Bounds {
-    /// For counts of this length in mm, a roller of this radius in mm, and a needle that moves at most so many counts in a tick.
+    /// For counts of this length in mm, a roller of this radius in mm, and a needle that moves at
+    /// most so many counts in a tick.
     pub(crate) fn new(mm_per_count: I2F30, roller_radius: I16F16, max_counts_per_tick: u16) -> Self {
         /// Ticks of a span.
         const SPAN: i64 = SPAN_LOOKS as i64 * LOOK_TICKS as i64;
@@ -96,7 +102,8 @@ impl Bounds {
         }
     }
 
-    /// True if `against`, the counts that a span has gained against `torque`, are those of a needle without a hand.
+    /// True if `against`, the counts that a span has gained against `torque`, are those of a needle
+    /// without a hand.
     fn is_driven(&self, against: i32, torque: U16F16) -> bool {
         // Torques stay below 512 mN·m, counts of them below 2^24.
         let counts = |per_mnm_q8: i32| ((i64::from(torque.to_bits()) * i64::from(per_mnm_q8)) >> 24) as i32;
@@ -155,8 +162,9 @@ impl Watch {
         is_back
     }
 
-    /// The torque to ask for instead of `wanted`, where `before` was given in the tick before: itself, or what is held while
-    /// turns are in doubt. Called in every tick in which the law's force is given.
+    /// The torque to ask for instead of `wanted`, where `before` was given in the tick before:
+    /// itself, or what is held while turns are in doubt. Called in every tick in which the law's
+    /// force is given.
     pub(crate) fn steady(&mut self, wanted: I16F16, before: I16F16) -> I16F16 {
         if self.turns < DOUBTFUL_TURNS { wanted } else { self.held(wanted, before) }
     }
@@ -215,21 +223,23 @@ impl Watch {
         MillimetresPerSecond(I16F16::from_bits(i32::try_from(bits).unwrap_or(i32::MAX)))
     }
 
-    /// True if the needle has been driven against its motor for no longer than a drive that is wired rightly may do so under a servo.
+    /// True if the needle has been driven against its motor for no longer than a drive that is
+    /// wired rightly may do so under a servo.
     #[cold]
     pub(crate) fn is_knock(&self) -> bool {
         self.driven_looks < SERVO_DRIVEN_LOOKS
     }
 
-    /// True if the motion of the spans continues in the last 3.2 ms. A motor that drives continues; a knock is over.
+    /// True if the motion of the spans continues in the last 3.2 ms. A motor that drives continues;
+    /// a knock is over.
     fn still_gains(&self) -> bool {
         let middle = self.count(2);
         let latest = self.count(0).wrapping_sub(middle).wrapping_sub(middle.wrapping_sub(self.count(4)));
         latest.signum() == self.gained.signum()
     }
 
-    /// The torque that [`Self::gained`] would come from: that of the middle of its spans. The latest one is a quarter of a period
-    /// late where a needle swings on a stiff wall.
+    /// The torque that [`Self::gained`] would come from: that of the middle of its spans. The
+    /// latest one is a quarter of a period late where a needle swings on a stiff wall.
     fn mean_torque(&self) -> I16F16 {
         let [early, middle, late] = [4, 3, 2].map(|looks| self.torque(looks).to_bits());
         I16F16::from_bits((early >> 2) + (middle >> 1) + (late >> 2))
@@ -276,7 +286,8 @@ mod tests {
         Bounds::new(I2F30::from_num(0.0157), I16F16::from_num(10), 16)
     }
 
-    /// Seconds until the watch finds something, of a needle whose depth in mm and torque in mN·m are these at each look.
+    /// Seconds until the watch finds something, of a needle whose depth in mm and torque in mN·m
+    /// are these at each look.
     fn found(mut at: impl FnMut(f64) -> (f64, f64), seconds: f64) -> Option<(f64, Fault)> {
         let (bounds, mut watch) = (bounds(), Watch::new(0));
         let mut last = 0;
@@ -334,7 +345,8 @@ mod tests {
         }
     }
 
-    /// 1 N gives way to 0.4 N under a hand that holds 30 g with 1.5 N/mm: a leap of 20 m/s² against the motor.
+    /// 1 N gives way to 0.4 N under a hand that holds 30 g with 1.5 N/mm: a leap of 20 m/s² against
+    /// the motor.
     #[test]
     fn a_wall_that_gives_way_is_left_alone() {
         let leap = |time: f64| {
@@ -348,7 +360,8 @@ mod tests {
         assert_eq!(found(leap, 0.1), None);
     }
 
-    /// 30 g that a hand leans with 0.4 N on a wall of 5.6 N/mm, knocked by 30 mm/s: it swings at 69 Hz with 13 m/s².
+    /// 30 g that a hand leans with 0.4 N on a wall of 5.6 N/mm, knocked by 30 mm/s: it swings at 69
+    /// Hz with 13 m/s².
     #[test]
     fn a_needle_knocked_against_a_stiff_wall_is_left_alone() {
         for (amplitude, phase) in
@@ -361,8 +374,8 @@ mod tests {
         }
     }
 
-    /// A light tap on a needle that is pressed with 0.4 N: 30 mm/s at once, at any place between two looks and two counts, which a hand of
-    /// 30 g then loses in 20 ms.
+    /// A light tap on a needle that is pressed with 0.4 N: 30 mm/s at once, at any place between
+    /// two looks and two counts, which a hand of 30 g then loses in 20 ms.
     #[test]
     fn a_tap_is_left_alone() {
         for (late, place) in
@@ -384,8 +397,9 @@ mod tests {
         assert!(fault == Fault::Overspeed && time < 0.0235, "{time}");
     }
 
-    /// 30 g with 0.02 N of dry friction against a wall of 5.6 N/mm, whose force is a tick late and steps by 0.09 N at each count.
-    /// A hand leans on it with half of that over the first count. The torque is held where turns are in doubt, or never.
+    /// 30 g with 0.02 N of dry friction against a wall of 5.6 N/mm, whose force is a tick late and
+    /// steps by 0.09 N at each count. A hand leans on it with half of that over the first count.
+    /// The torque is held where turns are in doubt, or never.
     fn chattered(holds: bool) -> Option<(f64, Fault)> {
         let mut watch = Watch::new(0);
         let (mut depth, mut speed, mut last, mut given) = (-1e-5, 0.2, 0, 0.0);

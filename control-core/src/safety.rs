@@ -1,4 +1,5 @@
-//! The last stage before the motor: limits that may reduce torque and never turn it round, and the step to a DAC code.
+//! The last stage before the motor: limits that may reduce torque and never turn it round, and the
+//! step to a DAC code.
 
 use crate::config::Device;
 use crate::event::Limits;
@@ -33,7 +34,8 @@ impl Limiter {
         MillinewtonMetres(self.given)
     }
 
-    /// Fades in and bounds the change in a tick; says what was in force. `wanted` is within the torque limit.
+    /// Fades in and bounds the change in a tick; says what was in force. `wanted` is within the
+    /// torque limit.
     pub(crate) fn tick(
         &mut self,
         limits: &TorqueLimits,

@@ -1,10 +1,11 @@
-//! The sine of a phase, for what is periodic: excitations, and forces that repeat with the turn of the rotor.
+//! The sine of a phase, for what is periodic: excitations, and forces that repeat with the turn of
+//! the rotor.
 
 use crate::math::upper_half;
 use fixed::types::I2F30;
 
-/// Sine of a phase of which 2^32 is a turn; error below 1e-4. Straight lines between 256 points: twelve sines are to fit a
-/// tick.
+/// Sine of a phase of which 2^32 is a turn; error below 1e-4. Straight lines between 256 points:
+/// twelve sines are to fit a tick.
 pub(crate) fn sine(phase: u32) -> I2F30 {
     let place = (phase >> 24) as usize;
     let point = |place: usize| SINE_Q30.get(place).copied().unwrap_or_default();

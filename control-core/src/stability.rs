@@ -1,9 +1,11 @@
-//! The stiffness that a wall may have on a device, from its moving mass and friction and the delay of its motor. It knows no tissue.
+//! The stiffness that a wall may have on a device, from its moving mass and friction and the delay
+//! of its motor. It knows no tissue.
 //!
-//! With the roller at rest between two counts a wall pushes with either of two forces, `K·Δ` apart: dry friction `f` holds both
-//! where `K ≤ 2f/Δ` (Abbott and Okamura, IEEE Trans. Robotics 21, 2005; Diolaiti et al., the same 22, 2006).
-//! A force that is late by `τ` is a spring with a damping of `−K·τ`. A swing of speed `v` dies away where friction takes more
-//! than that gives, by describing function `4f/π ≥ K·τ·v`, if the delay is short against the swing, `τ·√(K/m) ≤ φ`.
+//! With the roller at rest between two counts a wall pushes with either of two forces, `K·Δ` apart:
+//! dry friction `f` holds both where `K ≤ 2f/Δ` (Abbott and Okamura, IEEE Trans. Robotics 21, 2005;
+//! Diolaiti et al., the same 22, 2006). A force that is late by `τ` is a spring with a damping of
+//! `−K·τ`. A swing of speed `v` dies away where friction takes more than that gives, by describing
+//! function `4f/π ≥ K·τ·v`, if the delay is short against the swing, `τ·√(K/m) ≤ φ`.
 
 use crate::config::Device;
 use crate::kinematics::mm_per_count;
@@ -14,7 +16,8 @@ use fixed::types::{I16F16, I32F32};
 pub(crate) const STEEPEST: I16F16 = I16F16::from_bits(7 << 16);
 /// A code is held for a tick: half of it on the average is delay, µs.
 const HELD_US: i64 = 50;
-/// `4/(π·v)` for a knock of 42 mm/s, in µs/mm: with it 2 N/mm go with 0.01 N and one tick of delay, as the design notes measured.
+/// `4/(π·v)` for a knock of 42 mm/s, in µs/mm: with it 2 N/mm go with 0.01 N and one tick of delay,
+/// as the design notes measured.
 const SWING: i64 = 30_315;
 /// φ² for a quarter of a radian, in N·µs²/(g·mm).
 const SHORT: i64 = 62_500;
@@ -24,8 +27,8 @@ pub fn stiffest(device: &Device) -> Stiffness {
     Stiffness(stiffest_with(device, I16F16::ONE))
 }
 
-/// The steepest slope that `device` renders without ringing while `friction_share` of its dry friction is left where the needle moves,
-/// N/mm.
+/// The steepest slope that `device` renders without ringing while `friction_share` of its dry
+/// friction is left where the needle moves, N/mm.
 pub(crate) fn stiffest_with(device: &Device, friction_share: I16F16) -> I16F16 {
     let mechanism = &device.mechanism;
     let friction = I32F32::from_num(mechanism.dry_friction.0);

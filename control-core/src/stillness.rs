@@ -1,14 +1,16 @@
 //! Distinguishes an encoder that no longer counts from a hand that holds still.
 //!
-//! Both look the same: torque, and no count. A hand shows itself when the torque falls, because its own force then moves the needle;
-//! a dead encoder shows nothing, whatever the torque. So after a while of torque without a count the torque is
-//! taken away, within 40 ms, until a count comes: the force that a hand feels changes by no more than it takes to move its needle
-//! by a count, and comes back within 50 ms. If no count comes, not even without torque, the encoder is dead.
+//! Both look the same: torque, and no count. A hand shows itself when the torque falls, because its
+//! own force then moves the needle; a dead encoder shows nothing, whatever the torque. So after a
+//! while of torque without a count the torque is taken away, within 40 ms, until a count comes: the
+//! force that a hand feels changes by no more than it takes to move its needle by a count, and
+//! comes back within 50 ms. If no count comes, not even without torque, the encoder is dead.
 //!
-//! The wait depends on what the encoder's lines say. An encoder without its supply or its ground leaves both of them
-//! at one level, as a live one does at every other count. If they agree, 50 ms without a count are in doubt. If one is
-//! high and the other low, both against their pulls, the encoder has power, and only its disc or an output could be dead: that is in
-//! doubt after 4 s. So are counts that go to and fro between two values for 4 s, as they do when one channel is dead.
+//! The wait depends on what the encoder's lines say. An encoder without its supply or its ground
+//! leaves both of them at one level, as a live one does at every other count. If they agree, 50 ms
+//! without a count are in doubt. If one is high and the other low, both against their pulls, the
+//! encoder has power, and only its disc or an output could be dead: that is in doubt after 4 s. So
+//! are counts that go to and fro between two values for 4 s, as they do when one channel is dead.
 //!
 //! Each tick notes its step; the rest is done in one tick of eight, so that the tick stays short.
 
@@ -43,7 +45,8 @@ pub(crate) struct Stillness {
     moves: u8,
     /// Looks with torque since the last count.
     since_count: u32,
-    /// Looks with torque since the last count that did not go back to where the one before came from.
+    /// Looks with torque since the last count that did not go back to where the one before came
+    /// from.
     since_progress: u32,
     /// Share of the torque that is taken away.
     taken: I2F30,
@@ -57,13 +60,15 @@ impl Default for Stillness {
 }
 
 impl Stillness {
-    /// Takes a step of the needle; `is_back` if it went back to where the step before came from. Called in every tick with a step.
+    /// Takes a step of the needle; `is_back` if it went back to where the step before came from.
+    /// Called in every tick with a step.
     #[inline]
     pub(crate) fn step(&mut self, is_back: bool) {
         self.moves |= if is_back { MOVED } else { MOVED | PROGRESSED };
     }
 
-    /// Returns true if the needle has got on since the last look and all of the torque is given: then there is nothing to look at.
+    /// Returns true if the needle has got on since the last look and all of the torque is given:
+    /// then there is nothing to look at.
     #[inline]
     pub(crate) fn is_moving(&self) -> bool {
         self.moves & PROGRESSED != 0 && !self.is_asking()
@@ -75,8 +80,8 @@ impl Stillness {
         (self.moves, self.since_count, self.since_progress) = (0, 0, 0);
     }
 
-    /// Takes a look; `is_loaded` if the torque that the law asks for would move a needle that nobody holds. Called in one tick
-    /// of [`LOOK_TICKS`].
+    /// Takes a look; `is_loaded` if the torque that the law asks for would move a needle that
+    /// nobody holds. Called in one tick of [`LOOK_TICKS`].
     pub(crate) fn look(&mut self, is_loaded: bool) {
         let moves = core::mem::take(&mut self.moves);
         // They never wrap: long before, the needle is in doubt.
@@ -96,12 +101,13 @@ impl Stillness {
         self.taken != I2F30::ZERO
     }
 
-    /// Takes torque away while the encoder is in doubt, and gives it back; called after each look. `is_off` if no torque was
-    /// given in the tick before. Returns true if the encoder is dead.
+    /// Takes torque away while the encoder is in doubt, and gives it back; called after each look.
+    /// `is_off` if no torque was given in the tick before. Returns true if the encoder is dead.
     pub(crate) fn ask(&mut self, is_doubtful: bool, is_off: bool) -> bool {
         if !is_doubtful {
             self.without_torque = 0;
-            // Asked again before all of it is back, a hand would give way a little further each time, and then no more.
+            // Asked again before all of it is back, a hand would give way a little further each
+            // time, and then no more.
             self.since_count = 0;
             self.taken = self.taken.saturating_sub(RISE).max(I2F30::ZERO);
             return false;
@@ -113,20 +119,21 @@ impl Stillness {
         self.without_torque > WITHOUT_TORQUE_LOOKS
     }
 
-    /// Returns what is left of `torque`.
+    /// Returns the rest of `torque`.
     pub(crate) fn left_of(&self, torque: I16F16) -> I16F16 {
         let left = I2F30::ONE.saturating_sub(self.taken);
         I16F16::from_bits(truncating_product(torque.to_bits(), left.to_bits(), 30))
     }
 }
 
-/// A torque below this share of the limit is none: a friction of the needle's bearings.
+/// A torque below this share of the limit does not count: the friction of the needle's bearings.
 const LOADED_SHARE: u32 = 8;
 /// A torque that moves a needle which nobody holds is at least so many times the dry friction.
 const TIMES_FRICTION: u32 = 3;
 
-/// The smallest torque at which a needle without a count is looked at, in mN·m: an eighth of the limit, or three times the dry
-/// friction, and what stands even where no force is felt.
+/// The smallest torque at which a needle without a count is looked at, in mN·m: an eighth of the
+/// limit, or three times the dry friction, and the torque that is there even where no force is
+/// felt.
 pub(crate) fn loaded_torque(limit: I16F16, dry_friction: U16F16, at_rest: U16F16) -> U16F16 {
     let share = limit.unsigned_abs() / LOADED_SHARE;
     share.max(dry_friction.saturating_mul_int(TIMES_FRICTION)).saturating_add(at_rest)

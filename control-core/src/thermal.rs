@@ -1,5 +1,6 @@
-//! The motor's winding as one heat store: torque squared warms it, time cools it. Before the heat of the continuous
-//! torque is reached the torque limit falls to the continuous torque; that is a limit in force, not a fault.
+//! The motor's winding as one heat store: torque squared warms it, time cools it. Before the heat
+//! of the continuous torque is reached the torque limit falls to the continuous torque; that is a
+//! limit in force, not a fault.
 
 use crate::TICK_HZ;
 use crate::math::{saturating_product, truncating_product};
@@ -73,8 +74,8 @@ impl Winding {
         const { assert!(WARM_TICKS == 8, "three places") };
         let mean: I32F32 = core::mem::take(&mut self.squared) >> 3_u32;
         let towards_q32 = (mean - self.heat).to_bits();
-        // What is left of the difference fits. The step is a share of 2^-10 or less: in Q52, with 20 places taken off last,
-        // nothing of it is lost.
+        // The rest of the difference fits. The step is a share of 2^-10 or less: in Q52, with 20
+        // places taken off last, nothing of it is lost.
         let step_q52 = i64::from((towards_q32 >> 20) as i32) * i64::from(limits.warming.to_bits());
         self.heat += I32F32::from_bits(step_q52 >> 20);
     }

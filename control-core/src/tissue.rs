@@ -1,4 +1,5 @@
-//! Tissue as a person configures it: layers with their walls, perpendicular to the skin, and a vessel among them.
+//! Tissue as a person configures it: layers with their walls, perpendicular to the skin, and a
+//! vessel among them.
 
 use crate::units::{FrictionPerMillimetre, JogCompliance, Millimetres, Newtons, Stiffness};
 use fixed::types::I16F16;
@@ -10,14 +11,15 @@ pub const SPRING_BACK: I16F16 = I16F16::from_bits(19_661);
 /// The most layers of a tissue.
 pub const MAX_LAYERS: usize = 6;
 
-/// A vessel among the layers, the one whose near wall is of [`Tissue::Vessel`]: a tube with its axis level with the skin and
-/// along the way that the needle points, oval across. Its depth and its vertical diameter are those of its two walls' layers
-/// over the axis.
+/// A vessel among the layers, the one whose near wall is of [`Tissue::Vessel`]: a tube with its
+/// axis level with the skin and along the way that the needle points, oval across. Its depth and
+/// its vertical diameter are those of its two walls' layers over the axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Vessel {
     /// Horizontal diameter, 0.2–30 mm.
     pub width: Millimetres,
-    /// The distance of the needle's plane from the axis; half the width and more is past the vessel.
+    /// The distance of the needle's plane from the axis; half the width and more is past the
+    /// vessel.
     pub offset: Millimetres,
 }
 
@@ -65,12 +67,13 @@ pub struct Wall {
     pub elastic: Parabola,
     /// Travel past contact at which it gives way, up to 30 mm.
     pub puncture_travel: Millimetres,
-    /// Force against travel past contact once it has given way; its vertex is beyond `puncture_travel`, and past it the
-    /// force is `base`.
+    /// Force against travel past contact once it has given way; its vertex is beyond
+    /// `puncture_travel`, and past it the force is `base`.
     pub relief: Parabola,
     /// Slope with which the relief force lets go when the needle is drawn back.
     pub unload: Stiffness,
-    /// Part of the indentation that is left when the wall has just given way, 0–1; it goes as far as the relief goes.
+    /// Part of the indentation that is left when the wall has just given way, 0–1; it goes as far
+    /// as the relief goes.
     pub spring_back: I16F16,
 }
 

@@ -1,4 +1,5 @@
-//! Quantities with their unit in the type. Plain data: arithmetic stays with whoever knows what it means.
+//! Quantities with their unit in the type. Plain data: arithmetic stays with whoever knows what it
+//! means.
 
 use core::fmt;
 use fixed::types::{I8F24, I16F16};
@@ -20,7 +21,8 @@ macro_rules! quantity {
 }
 
 quantity!(
-    /// Encoder counts, positive in the insertion direction. Absolute counts wrap at the ends of `i32`.
+    /// Encoder counts, positive in the insertion direction. Absolute counts wrap at the ends of
+    /// `i32`.
     Counts(i32),
     "counts"
 );

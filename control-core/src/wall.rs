@@ -1,5 +1,5 @@
-//! The jog effect of a wall (Paper 001, eq. 1): it resists along a rising parabola, gives way, and relieves along a
-//! falling one that is felt only while the tip cuts on.
+//! The jog effect of a wall (Paper 001, eq. 1): it resists along a rising parabola, gives way, and
+//! relieves along a falling one that is felt only while the tip cuts on.
 
 use crate::math::{saturating_product, truncating_product, upper_half};
 use crate::tissue::{self, MAX_LAYERS};
@@ -7,8 +7,8 @@ use crate::units::{Millimetres, Newtons};
 use fixed::types::{I9F23, I16F16};
 use heapless::Vec;
 
-/// A parabola ready for the tick. `(x − n)²/a` is computed as `((x − n)/√a)²`: two multiplications, and precise for a
-/// soft wall and a hard one alike.
+/// A parabola ready for the tick. `(x − n)²/a` is computed as `((x − n)/√a)²`: two multiplications,
+/// and precise for a soft wall and a hard one alike.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Parabola {
     /// Travel past contact at which it turns.
@@ -43,8 +43,8 @@ impl Parabola {
         travel.saturating_sub(self.vertex)
     }
 
-    /// [`Self::force`] so far from the vertex, where the wall is felt: [`crate::plan`] has seen to it that the rise is
-    /// below 256 N there.
+    /// [`Self::force`] so far from the vertex, where the wall is felt: [`crate::plan`] has seen to
+    /// it that the rise is below 256 N there.
     fn force_felt(&self, from_vertex: I16F16) -> Newtons {
         let root_q22 = truncating_product(from_vertex.to_bits(), self.inverse_root_compliance.to_bits(), 17);
         let rise = I16F16::from_bits(upper_half(root_q22 << 2, root_q22 << 2));
@@ -94,8 +94,8 @@ impl Wall {
         self.elastic.force_felt(self.elastic.past_vertex(travel))
     }
 
-    /// Force of the wall that has given way, with the tip at its puncture or deeper, or drawn back from there: then the
-    /// force lets go along the unloading slope and never pulls.
+    /// Force of the wall that has given way, with the tip at its puncture or deeper, or drawn back
+    /// from there: then the force lets go along the unloading slope and never pulls.
     pub(crate) fn relief_force(&self, cut: &mut Cut, travel: I16F16) -> Newtons {
         if travel > cut.frontier {
             let past_vertex = self.relief.past_vertex(travel);

@@ -1,5 +1,5 @@
-//! `calibrate [EFFECT…]`: the diagnosis on recordings of a small simulator, one line per case. For thresholds and
-//! development; the blinded proof is elsewhere.
+//! `calibrate [EFFECT…]`: the diagnosis on recordings of a small simulator, one line per case. For
+//! thresholds and development; the blinded proof is elsewhere.
 
 #[path = "../tests/behaviour/common.rs"]
 mod common;
@@ -60,7 +60,8 @@ fn main() {
     println!("{right} of {whole} named alone");
 }
 
-/// Diagnoses one case and prints its line: true if its effect is named alone, none if it was refused.
+/// Diagnoses one case and prints its line: true if its effect is named alone, none if it was
+/// refused.
 fn one(effect: &'static str, size: f64, closed: bool, seed: u64) -> Option<bool> {
     let rate = [1000.0, 2000.0, 500.0][(seed % 3) as usize];
     let setup = Setup { effect, size, closed, rate, seconds: 12.0, disturbance: 0.05, seed: seed + 1 };

@@ -1,4 +1,5 @@
-//! `diagnose RIG FIT[,FIT…] HELD[,HELD…] [DIR]`: the ten lines for the terminal, with the time it took.
+//! `diagnose RIG FIT[,FIT…] HELD[,HELD…] [DIR]`: the ten lines for the terminal, with the time it
+//! took.
 
 use diagnosis::{Request, diagnose};
 use std::path::PathBuf;

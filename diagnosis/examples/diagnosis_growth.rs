@@ -1,5 +1,6 @@
-//! The time of a diagnosis of ten seconds at 1 kHz to fit and as many to hold out, of a hundred, and of a thousand:
-//! `cargo run --release -p diagnosis --example diagnosis_growth`. Prints `work.diagnose.rows.…=…` for each, in s.
+//! The time of a diagnosis of ten seconds at 1 kHz to fit and as many to hold out, of a hundred,
+//! and of a thousand: `cargo run --release -p diagnosis --example diagnosis_growth`. Prints
+//! `work.diagnose.rows.…=…` for each, in s.
 
 #[path = "../tests/behaviour/common.rs"]
 mod common;

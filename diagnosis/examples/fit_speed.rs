@@ -1,6 +1,7 @@
-//! Fits inertia, friction and offset of a rig to a recording by what its free run is off, and prints the time and the values:
-//! `cargo run --release -p diagnosis --example fit_speed -- rig.toml fit.csv`. `cargo xtask bench parameter_fit_s` runs it by turns
-//! with SciPy's `least_squares` on the same error.
+//! Fits inertia, friction and offset of a rig to a recording by what its free run is off, and
+//! prints the time and the values: `cargo run --release -p diagnosis --example fit_speed --
+//! rig.toml fit.csv`. `cargo xtask bench parameter_fit_s` runs it by turns with SciPy's
+//! `least_squares` on the same error.
 
 use diagnosis::recording::Recording;
 use diagnosis::rig::Rig;

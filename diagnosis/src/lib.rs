@@ -1,14 +1,18 @@
-//! Diagnosis of the difference between a simulation and recordings: which physics was left out, how sure that is, and the evidence.
+//! Diagnosis of the difference between a simulation and recordings: which physics was left out, how
+//! sure that is, and the evidence.
 //!
-//! Given a rig (the nominal simulation) and recordings, [`diagnose`] refits the nominal values, searches the residual for the effects
-//! of [`effects::EffectName`], judges them on recordings that were not used for fitting, and reports. This crate knows rigs and
-//! recordings; it may not know devices, links or plots of other crates.
+//! Given a rig (the nominal simulation) and recordings, [`diagnose`] refits the nominal values,
+//! searches the residual for the effects of [`effects::EffectName`], judges them on recordings that
+//! were not used for fitting, and reports. This crate knows rigs and recordings; it may not know
+//! devices, links or plots of other crates.
 //!
-//! Folders, each using only those before it: `numerics` (linear algebra, searches, bootstrap), `effects` (the laws), `io`
-//! (rigs, recordings, the report's shape), `simulation` (a rig run forward), `estimation` (blocks, filter, noise, fit),
-//! `selection` (candidates and their shapes), `validation` (held-out recordings), `pipeline` (the stages, one after another) and
-//! `report` (sentences, pages and files). `tests/behaviour/layout.rs` checks this, and that no files use each other in a circle. The numbers
-//! that admit or reject a name are in `thresholds`, which every folder may read.
+//! Folders, each using only those before it: `numerics` (linear algebra, searches, bootstrap),
+//! `effects` (the laws), `io` (rigs, recordings, the report's shape), `simulation` (a rig run
+//! forward), `estimation` (blocks, filter, noise, fit), `selection` (candidates and their shapes),
+//! `validation` (held-out recordings), `pipeline` (the stages, one after another) and `report`
+//! (sentences, pages and files). `tests/behaviour/layout.rs` checks this, and that no files use
+//! each other in a circle. The numbers that admit or reject a name are in `thresholds`, which every
+//! folder may read.
 
 // Matrices are read by row and column.
 #![allow(clippy::needless_range_loop)]
@@ -48,7 +52,8 @@ pub struct Request {
     pub effects: Option<PathBuf>,
 }
 
-/// Reads the files, diagnoses the recordings and reports. `progress` receives the stage and the fraction done.
+/// Reads the files, diagnoses the recordings and reports. `progress` receives the stage and the
+/// fraction done.
 pub fn diagnose(request: &Request, progress: &(dyn Fn(&str, f64) + Sync)) -> Result<Outcome, InputError> {
     progress("reading", 0.0);
     if request.fit.is_empty() || request.holdout.is_empty() {
@@ -69,7 +74,8 @@ pub fn diagnose(request: &Request, progress: &(dyn Fn(&str, f64) + Sync)) -> Res
     diagnose_recordings(&rig, &fit, &holdout, progress)
 }
 
-/// Diagnoses recordings that are already read; an error where one cannot be used, as where a unit or a sign is wrong.
+/// Diagnoses recordings that are already read; an error where one cannot be used, as where a unit
+/// or a sign is wrong.
 pub fn diagnose_recordings(
     rig: &Rig,
     fit: &[Recording],

@@ -1,8 +1,10 @@
-//! Every number that admits or rejects a name, in one place, with its unit and what it means. Whatever only limits a search (steps, grids,
-//! how many candidates are fitted) stands where it is used.
+//! Every number that admits or rejects a name, in one place, with its unit and what it means.
+//! Whatever only limits a search (steps, grids, how many candidates are fitted) is where it is
+//! used.
 //!
-//! Shares are parts of the refit's mean square above the noise; z is a gain over its standard error; nats are log-likelihood. Where no
-//! other source is given a number was set by hand on development seeds of `cargo xtask prove`; docs/diagnosis-design.md says how that fares.
+//! Shares are parts of the refit's mean square above the noise; z is a gain over its standard
+//! error; nats are log-likelihood. Where no other source is given a number was set by hand on
+//! development seeds of `cargo xtask prove`; docs/diagnosis-design.md says how that fares.
 
 use std::ops::Range;
 
@@ -13,9 +15,10 @@ pub(crate) const UNDECIDED: f64 = 0.5;
 /// Probability: least and most that is ever claimed.
 pub(crate) const CLAIMED: (f64, f64) = (0.01, 0.99);
 
-/// Log-odds without any evidence, and what each piece adds: a logistic regression (`prove --calibrate`), rounded towards doubt, on 728
-/// names of seeds 14 and 16 (whole), 13 and 1701 to 1703 (one effect, nulls), 13 and 505 (pairs) and 1501, 1601, 1711 and 1712 (physics
-/// without a name), 22 of them wrong.
+/// Log-odds without any evidence, and what each piece adds: a logistic regression (`prove
+/// --calibrate`), rounded towards doubt, on 728 names of seeds 14 and 16 (whole), 13 and 1701 to
+/// 1703 (one effect, nulls), 13 and 505 (pairs) and 1501, 1601, 1711 and 1712 (physics without a
+/// name), 22 of them wrong.
 pub(crate) const BIAS: f64 = 2.0;
 /// See [`BIAS`].
 pub(crate) const WEIGHTS: [(&str, f64); 5] = [
@@ -29,7 +32,8 @@ pub(crate) const WEIGHTS: [(&str, f64); 5] = [
 pub(crate) const SUREST_Z: f64 = 20.0;
 /// Parts of the force that are left: less counts as hardly anything, more as no worse.
 pub(crate) const LEFT_OF_FORCE: (f64, f64) = (0.005, 0.3);
-/// Least share that counts for an effect that is certain on every stretch: it may be small compared with larger ones.
+/// Least share that counts for an effect that is certain on every stretch: it may be small compared
+/// with larger ones.
 pub(crate) const CERTAIN_SHARE: f64 = 0.15;
 
 /// Least share that counts for any other effect.
@@ -37,7 +41,8 @@ pub(crate) const COUNTED_SHARE: f64 = 0.03;
 
 /// z on fitted and on held-out recordings that is sure, over stretches of time or of the score.
 pub(crate) const SURE_Z: f64 = 3.0;
-/// z on held-out recordings, and on fitted ones for effects that act in few moments, below which a gain does not count.
+/// z on held-out recordings, and on fitted ones for effects that act in few moments, below which a
+/// gain does not count.
 pub(crate) const UNLIKELY_Z: f64 = 2.0;
 /// z on the fitted recordings from which an effect may generalise together with another.
 pub(crate) const PROMISING_Z: f64 = 2.5;
@@ -49,11 +54,13 @@ pub(crate) const CERTAIN_Z: f64 = 6.0;
 pub(crate) const LEAST_SHARE: f64 = 0.01;
 /// Least share of any other effect.
 pub(crate) const SHARE: f64 = 0.05;
-/// Share from which an effect need not have that z: the form of a larger effect is never quite right.
+/// Share from which an effect need not have that z: the form of a larger effect is never quite
+/// right.
 pub(crate) const FAIR_SHARE: f64 = 0.1;
 /// Share that is most of what was left out.
 pub(crate) const MOST_SHARE: f64 = 0.5;
-/// Least share of an effect that is hardly sure: a wandering bias looks like a small effect for the length of two recordings.
+/// Least share of an effect that is hardly sure: a wandering bias looks like a small effect for the
+/// length of two recordings.
 pub(crate) const UNSURE_SHARE: f64 = 0.7;
 /// Share from which an effect may rest on few moments: counts are lost now and then.
 pub(crate) const NEARLY_ALL_SHARE: f64 = 0.9;
@@ -61,29 +68,33 @@ pub(crate) const NEARLY_ALL_SHARE: f64 = 0.9;
 pub(crate) const HALF_OF_FORCE: f64 = 0.5;
 /// Part of a gain by which the lower end of its interval may be below zero without harm.
 pub(crate) const HARMLESS: f64 = 0.05;
-/// Factors between an effect's size on one recording and on all within which the sizes count as the same.
+/// Factors between an effect's size on one recording and on all within which the sizes count as the
+/// same.
 pub(crate) const SAME_SIZE: Range<f64> = 0.75..1.33;
 /// Factors within which the sizes hardly differ.
 pub(crate) const HARDLY_ANOTHER_SIZE: Range<f64> = 0.85..1.18;
 
-/// Part of the held-out force error, root mean square, that an effect must take off to be named, however sure it is: the simulation is
-/// right to that part without it. A third generator lost 2 of 89 right names and 2 of 16 wrong ones by it, two of three named nulls.
+/// Part of the held-out force error, root mean square, that an effect must take off to be named,
+/// however sure it is: the simulation is right to that part without it. A third generator lost 2 of
+/// 89 right names and 2 of 16 wrong ones by it, two of three named nulls.
 pub(crate) const MATERIAL: f64 = 0.05;
-/// Log-odds that a name loses where the patched simulation follows the motion less well in windows of half a second or less, and the
-/// factor between the errors from which it does. On machines six of six wrong names did, on a generator 19 of 89 right ones: it is
-/// weighed, and takes no name.
+/// Log-odds that a name loses where the patched simulation follows the motion less well in windows
+/// of half a second or less, and the factor between the errors from which it does. On machines six
+/// of six wrong names did, on a generator 19 of 89 right ones: it is weighed, and takes no name.
 pub(crate) const WORSE_MOTION: (f64, f64) = (1.0, 1.05);
 
 /// z by which a rival must be behind not to share a class.
 pub(crate) const BEHIND_Z: f64 = 2.0;
-/// z by which a rival must lead to take an effect's place: it is then the better one with a probability of 84 %.
+/// z by which a rival must lead to take an effect's place: it is then the better one with a
+/// probability of 84 %.
 pub(crate) const LEADS_Z: f64 = 1.0;
 /// Nats by which a rival must be behind as well as [`BEHIND_Z`].
 pub(crate) const BEHIND_NATS: f64 = 3.0;
-/// The same as a part of the effect's gain: a smaller lead comes from the form of a law, not from its name.
+/// The same as a part of the effect's gain: a smaller lead comes from the form of a law, not from
+/// its name.
 pub(crate) const BEHIND_PART: f64 = 0.015;
-/// Nats by which a rival must be behind under coloured noise to be excluded, whatever white noise gives; half of the winner's gain is
-/// needed too.
+/// Nats by which a rival must be behind under coloured noise to be excluded, whatever white noise
+/// gives; half of the winner's gain is needed too.
 pub(crate) const BEHIND_SLOW_NATS: f64 = 30.0;
 /// z that such a rival counts as behind by.
 pub(crate) const BEHIND_SLOW_Z: f64 = 4.0;
@@ -94,56 +105,67 @@ pub(crate) const ALIKE: f64 = 1.5;
 
 /// z from which the gain of a force of any form is sure: ten forms are tried on every model.
 pub(crate) const FORM_SURE_Z: f64 = 3.0;
-/// Part of what a force of any form takes that an effect must take to be named, and must take beyond it where it takes less. Of a force
-/// of one variable alone the rest is enough: on EMPS friction by direction takes a quarter of what any force over speed takes, as real
-/// friction has more to it than one law.
+/// Part of what a force of any form takes that an effect must take to be named, and must take
+/// beyond it where it takes less. Of a force of one variable alone the rest is enough: on EMPS
+/// friction by direction takes a quarter of what any force over speed takes, as real friction has
+/// more to it than one law.
 pub(crate) const NEARLY_ALL_OF_FORM: f64 = 0.9;
 /// Part of the innovations' mean square that a force of any form must explain to be reported.
 pub(crate) const FORM_TOLD: f64 = 0.005;
-/// Part of an effect's gain that physics outside the library must gain instead: a law of slightly another form gains a little.
+/// Part of an effect's gain that physics outside the library must gain instead: a law of slightly
+/// another form gains a little.
 pub(crate) const OUTSIDE_PART: f64 = 0.1;
 /// Share that physics outside the library must explain alone to be reported.
 pub(crate) const OUTSIDE_ALONE: f64 = 0.5;
 
-/// Parts of the force: a model that leaves less than the first has understood it, one that leaves more than the second has not.
+/// Parts of the force: a model that leaves less than the first has understood it, one that leaves
+/// more than the second has not.
 pub(crate) const UNDERSTOOD: (f64, f64) = (0.12, 0.5);
 /// Part of what the refit leaves that a model between the two must stay below.
 pub(crate) const MUCH_OF_REFIT: f64 = 0.65;
 /// Part of the refit's mean square above which a fitted spring may well be a gap.
 pub(crate) const LEAVES_MUCH: f64 = 0.3;
 
-/// Nats under coloured noise, after the cost of freedom, below which an effect is not judged at all.
+/// Nats under coloured noise, after the cost of freedom, below which an effect is not judged at
+/// all.
 pub(crate) const MIN_LOG_LIKELIHOOD_GAIN: f64 = 6.0;
 /// Parts of what it is at first that a dry friction may gain with time.
 pub(crate) const DRIFT: Range<f64> = -0.95..3.0;
-/// Most of the travel, as a part of it, over which bristles bend: microns of a slide, tenths of a degree of a turn.
+/// Most of the travel, as a part of it, over which bristles bend: microns of a slide, tenths of a
+/// degree of a turn.
 pub(crate) const BRISTLES: f64 = 0.03;
 /// A value within this part of a bound counts as at the bound.
 pub(crate) const AT_END: f64 = 0.05;
-/// Part of the refit's residual, at one frequency that does not follow the axis, from which effects that explain it are rejected as
-/// standing for that oscillation.
+/// Part of the refit's residual, at one frequency that does not follow the axis, from which effects
+/// that explain it are rejected as standing for that oscillation.
 pub(crate) const MISTAKEN: f64 = 0.2;
 
-/// Residual of a model, over that of a motion read in whole counts, from which other physics limits, not noise, and shares decide: it
-/// is 1.9 in the median on generated nulls and 22 on axes of real machines (`docs/diagnosis-design.md`).
+/// Residual of a model, over that of a motion read in whole counts, from which other physics
+/// limits, not noise, and shares decide: it is 1.9 in the median on generated nulls and 22 on axes
+/// of real machines (`docs/diagnosis-design.md`).
 pub(crate) const LIMITED_BY_PHYSICS: f64 = 3.0;
 /// The same of the refit, below which noise is all there is, and what was found needs no share.
 pub(crate) const LEAVES_SOMETHING: f64 = 2.0;
-/// Most probability of a name that no share confirms where other physics limits: the gain of a law says little there.
+/// Most probability of a name that no share confirms where other physics limits: the gain of a law
+/// says little there.
 pub(crate) const SUREST_BESIDE_PHYSICS: f64 = 0.8;
-/// Part of the force error, root mean square, on stretches left out of the fit and on held-out recordings, from which an effect joins
-/// the regression: with two effects in the recordings the first alone takes little.
+/// Part of the force error, root mean square, on stretches left out of the fit and on held-out
+/// recordings, from which an effect joins the regression: with two effects in the recordings the
+/// first alone takes little.
 pub(crate) const TAKEN_SHARE: f64 = 0.1;
-/// Part beside the others from which it is named. In 66 cases of effects concealed in both sets of machines (seed 36101) 20 to 35 % find
-/// as many of those concealed three times as strong as what the model leaves, and 20 % most of those as strong.
+/// Part beside the others from which it is named. In 66 cases of effects concealed in both sets of
+/// machines (seed 36101) 20 to 35 % find as many of those concealed three times as strong as what
+/// the model leaves, and 20 % most of those as strong.
 pub(crate) const NAMED_SHARE: f64 = 0.2;
-/// Factors between its sizes on held-out and on fitted recordings: in 90 cases of seed 52302 two of the ten wrong names were outside.
+/// Factors between its sizes on held-out and on fitted recordings: in 90 cases of seed 52302 two of
+/// the ten wrong names were outside.
 pub(crate) const SAME_SIZE_OF_SHARE: Range<f64> = 0.6..1.67;
-/// Part of what an effect leaves that a force of any form over the motion must leave if it replaces the effect: if the form leaves less, the law is
-/// another one. In the same cases the least of a right name is 0.77.
+/// Part of what an effect leaves that a force of any form over the motion must leave if it replaces
+/// the effect: if the form leaves less, the law is another one. In the same cases the least of a
+/// right name is 0.77.
 pub(crate) const FORM_LEAVES: f64 = 0.7;
 /// Part of what an effect leaves by which a rival may leave more and still join its class.
 pub(crate) const AS_GOOD: f64 = 0.05;
-/// Log-odds of a name by shares, without a share and per share: in 90 cases of seed 52302 24 of 30 names were right with a share below 0.4, 16 of 20
-/// below 0.6 and 26 of 26 above.
+/// Log-odds of a name by shares, without a share and per share: in 90 cases of seed 52302 24 of 30
+/// names were right with a share below 0.4, 16 of 20 below 0.6 and 26 of 26 above.
 pub(crate) const SHARE_ODDS: (f64, f64) = (0.6, 4.0);

@@ -1,8 +1,9 @@
-//! The tasks of the firmware and nothing else: which interrupt starts them and at which priority. What they do is in
-//! [`firmware::tasks`], what they do it with in [`crate::board`] and [`crate::chip`].
+//! The tasks of the firmware and nothing else: which interrupt starts them and at which priority.
+//! What they do is in [`firmware::tasks`], what they do it with in [`crate::board`] and
+//! [`crate::chip`].
 //!
-//! No task shares anything by lock. Orders go to the tick and samples come from it through queues with one writer and one
-//! reader; single words go through atomics ([`firmware::tasks::shared`]).
+//! No task shares anything by lock. Orders go to the tick and samples come from it through queues
+//! with one writer and one reader; single words go through atomics ([`firmware::tasks::shared`]).
 
 // RTIC takes priorities as literals only: these hold them to the ones that `timing` explains.
 const _: () = {
@@ -36,7 +37,8 @@ mod app {
         tilt: Tilt<Current>,
     }
 
-    // What is large has its place from the start: a `Local` that held it would be moved there over the stack.
+    // What is large has its place from the start: a `Local` that held it would be moved there over
+    // the stack.
     #[init(local = [
         queues: Queues = Queues::new(),
         statics: Statics = Statics::new(),
@@ -83,8 +85,9 @@ mod app {
         }
     }
 
-    /// The control tick. Deadline: the next tick, 100 µs after the timer's edge; a tick that misses it takes torque away
-    /// and says so. Above every other task, masked by PRIMASK only; never logs, never waits.
+    /// The control tick. Deadline: the next tick, 100 µs after the timer's edge; a tick that misses
+    /// it takes torque away and says so. Above every other task, masked by PRIMASK only; never
+    /// logs, never waits.
     #[task(binds = TIM4, priority = 16, local = [tick])]
     fn tick(context: tick::Context) {
         context.local.tick.run();
@@ -97,19 +100,22 @@ mod app {
         firmware::tasks::supply::fell(&SHARED);
     }
 
-    /// Every millisecond: sets the others off, hears who is alive, feeds the watchdog. Deadline: its period.
+    /// Every millisecond: sets the others off, hears who is alive, feeds the watchdog. Deadline:
+    /// its period.
     #[task(binds = SysTick, priority = 4, local = [supervisor])]
     fn supervisor(context: supervisor::Context) {
         context.local.supervisor.run();
     }
 
-    /// Moves packets between the USB core and the queues. Set off by the core and by the supervisor.
+    /// Moves packets between the USB core and the queues. Set off by the core and by the
+    /// supervisor.
     #[task(binds = OTG_FS, priority = 3, local = [usb])]
     fn usb(context: usb::Context) {
         context.local.usb.run();
     }
 
-    /// Commands in, orders out; samples in, frames out. On the interrupt of a serial port that is not used.
+    /// Commands in, orders out; samples in, frames out. On the interrupt of a serial port that is
+    /// not used.
     #[task(binds = USART2, priority = 2, local = [telemetry])]
     fn telemetry(context: telemetry::Context) {
         context.local.telemetry.run();

@@ -1,6 +1,7 @@
-//! Panic, hard fault, stray interrupt: the amplifier goes off, then the converters to zero torque, by direct register
-//! writes that need nothing to be in order, not even the stack. Then word is left for the next start, and the device
-//! resets itself, so that a PC finds a device that answers and says what happened. It names no pin: those are the board's.
+//! Panic, hard fault, stray interrupt: the amplifier goes off, then the converters to zero torque,
+//! by direct register writes that need nothing to be in order, not even the stack. Then word is
+//! left for the next start, and the device resets itself, so that a PC finds a device that answers
+//! and says what happened. It names no pin: those are the board's.
 #![allow(unsafe_code, reason = "after a fault nothing that owns a register can be trusted")]
 
 use crate::board::Wires;
@@ -15,9 +16,10 @@ use stm32f4xx_hal::pac::RCC;
 /// Amplifier off, then zero torque.
 fn safe_state() {
     cortex_m::interrupt::disable();
-    // Interrupts are off and whatever was interrupted never continues: nobody else uses these registers again. The writes are
-    // valid whatever state the peripherals are in; to one without a clock they do nothing, and then its pins are still inputs
-    // and the external pull-down holds the amplifier off.
+    // Interrupts are off and whatever was interrupted never continues: nobody else uses these
+    // registers again. The writes are valid whatever state the peripherals are in; to one without a
+    // clock they do nothing, and then its pins are still inputs and the external pull-down holds
+    // the amplifier off.
     Wires::ENABLE.set_low();
     chip::outputs_to_zero_torque();
 }
@@ -37,7 +39,8 @@ fn panic(info: &PanicInfo<'_>) -> ! {
         .map_or(Crash::new(CrashKind::Panic, 0), |place| Crash::panic(place.file(), place.line())))
 }
 
-/// The clock from outside has stopped while the clock security (RM0090 7.2.7) watched it; the core goes on, on its own oscillator.
+/// The clock from outside has stopped while the clock security (RM0090 7.2.7) watched it; the core
+/// goes on, on its own oscillator.
 #[exception]
 unsafe fn NonMaskableInt() -> ! {
     // SAFETY: interrupts cannot mask this one; nobody else runs any more.
@@ -51,7 +54,8 @@ unsafe fn DefaultHandler(number: i16) -> ! {
     end(&Crash::new(CrashKind::StrayInterrupt, number.unsigned_abs().into()))
 }
 
-/// Takes a fresh stack, for the old one may be what broke, and keeps where the core says that it put its frame.
+/// Takes a fresh stack, for the old one may be what broke, and keeps where the core says that it
+/// put its frame.
 #[unsafe(naked)]
 #[unsafe(no_mangle)]
 #[unsafe(link_section = ".HardFault.user")]
@@ -79,10 +83,11 @@ extern "C" fn hard_fault(frame: *const u32) -> ! {
     let (bottom, top) = (&raw const _stack_end as usize, &raw const _stack_start as usize);
     let at = frame as usize;
     let is_on_stack = at >= bottom && at + 4 * FRAME_WORDS <= top && at.is_multiple_of(4);
-    // SAFETY: eight words from `frame` lie in the memory that is the stack's, and any word there is a number.
+    // SAFETY: eight words from `frame` lie in the memory that is the stack's, and any word there is
+    // a number.
     let word = |place| if is_on_stack { unsafe { frame.add(place).read_volatile() } } else { 0 };
-    // SAFETY: reads without a side effect; nobody else runs any more. The address comes before the status that says whether it
-    // is valid: another fault would end here anew.
+    // SAFETY: reads without a side effect; nobody else runs any more. The address comes before the
+    // status that says whether it is valid: another fault would end here anew.
     let (bus_address, fault_status, hard) = unsafe {
         let scb = &*SCB::PTR;
         (scb.bfar.read(), scb.cfsr.read(), scb.hfsr.read())

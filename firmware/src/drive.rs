@@ -1,18 +1,20 @@
-//! The way out of the tick: converter and amplifier enable, in the order that never lets the amplifier see a code that was
-//! not meant for it. Enable is raised last and dropped first.
+//! The way out of the tick: converter and amplifier enable, in the order that never lets the
+//! amplifier see a code that was not meant for it. Enable is raised last and dropped first.
 
 use control_core::TickOutput;
 use control_core::config::DacWidth;
 use control_core::units::DacCode;
 use embedded_hal::digital::OutputPin;
 
-/// A converter that drives the servo amplifier's set value. Mid-scale is zero torque; code 0 is *full* torque.
+/// A converter that drives the servo amplifier's set value. Mid-scale is zero torque; code 0 is
+/// *full* torque.
 pub trait MotorDac {
     /// Resolution of this converter.
     const WIDTH: DacWidth;
 
-    /// Puts out `code`, which lies within [`Self::WIDTH`]. Called from the tick: takes a few bus cycles and never waits.
-    /// Where codes wait for an instant set by hardware, one that has missed it gives way to the next tick's.
+    /// Puts out `code`, which is within [`Self::WIDTH`]. Called from the tick: takes a few bus
+    /// cycles and never waits. Where codes wait for an instant set by hardware, one that has missed
+    /// it gives way to the next tick's.
     fn put(&mut self, code: DacCode);
 
     /// Zero torque.
@@ -34,12 +36,14 @@ impl<B: ByteBus> MotorDac for ParallelDac<B> {
     const WIDTH: DacWidth = DacWidth::BITS_8;
 
     fn put(&mut self, code: DacCode) {
-        // A wider code has its low eight bits cut only after it was clamped: 0 would be full torque.
+        // A wider code has its low eight bits cut only after it was clamped: 0 would be full
+        // torque.
         self.0.put(u8::try_from(code.0).unwrap_or(u8::MAX));
     }
 }
 
-/// A converter of 16 bits on a serial bus, such as an AD5662 or a DAC8551, with its command before the code.
+/// A converter of 16 bits on a serial bus, such as an AD5662 or a DAC8551, with its command before
+/// the code.
 pub trait CodeBus {
     /// Sends `code` without waiting for it to be out.
     fn send(&mut self, code: u16);
@@ -56,13 +60,15 @@ impl<B: CodeBus> MotorDac for SerialDac<B> {
     }
 }
 
-/// A timer's pulse width, for an amplifier that takes its set value so, with a line for the direction.
+/// A timer's pulse width, for an amplifier that takes its set value so, with a line for the
+/// direction.
 pub trait Pulse {
     /// Pulses of `on` of 32,767 parts of the period from the next period on; 0 is none.
     fn set_width(&mut self, on: u16);
 }
 
-/// Pulse width and direction as a [`MotorDac`]: the distance from mid-scale is the width, its sign the direction.
+/// Pulse width and direction as a [`MotorDac`]: the distance from mid-scale is the width, its sign
+/// the direction.
 pub struct PulseAndDirection<P, D> {
     /// The pulses.
     pub pulse: P,
@@ -75,8 +81,8 @@ impl<P: Pulse, D: OutputPin> MotorDac for PulseAndDirection<P, D> {
 
     fn put(&mut self, code: DacCode) {
         let zero = Self::WIDTH.mid_scale();
-        // A port pin of the microcontroller cannot fail. The direction first: the old width, which goes on to the end of its
-        // period, then goes the new way already.
+        // A port pin of the microcontroller cannot fail. The direction first: the old width, which
+        // goes on to the end of its period, then goes the new way already.
         let _ = if code.0 > zero { self.direction.set_high() } else { self.direction.set_low() };
         self.pulse.set_width(code.0.abs_diff(zero).min(Self::WIDTH.span()));
     }
@@ -87,7 +93,8 @@ pub trait Converters {
     /// The narrowest and the widest; one that is alone is there twice.
     const WIDTHS: [DacWidth; 2];
 
-    /// Gives `code` to the converter of this width, which is one of [`Self::WIDTHS`]: [`control_core::ceilings::Ceilings`] has seen to it.
+    /// Gives `code` to the converter of this width, which is one of [`Self::WIDTHS`]:
+    /// [`control_core::ceilings::Ceilings`] has seen to it.
     fn put(&mut self, width: DacWidth, code: DacCode);
 
     /// Zero torque at all of them.
@@ -111,8 +118,8 @@ impl<D: MotorDac> Converters for One<D> {
     }
 }
 
-/// A board with two converters. The one that is not chosen stays at zero torque: a plan changes only while torque is off, and then both
-/// are there.
+/// A board with two converters. The one that is not chosen stays at zero torque: a plan changes
+/// only while torque is off, and then both are there.
 pub struct Two<W, N> {
     /// The wider one.
     pub wide: W,
@@ -165,7 +172,8 @@ impl<C: Converters, E: OutputPin> Drive<C, E> {
         }
     }
 
-    /// Puts a code out at the widest converter while the amplifier stays off: for the test of the board, which looks at the pin.
+    /// Puts a code out at the widest converter while the amplifier stays off: for the test of the
+    /// board, which looks at the pin.
     pub fn put_while_off(&mut self, code: DacCode) {
         self.off();
         self.converters.put(C::WIDTHS[1], code);
@@ -307,7 +315,8 @@ mod tests {
         }
     }
 
-    /// Another converter, alone, is a number in the configuration and a `MotorDac`: the control law is the same.
+    /// Another converter, alone, is a number in the configuration and a `MotorDac`: the control law
+    /// is the same.
     #[test]
     fn a_converter_of_16_bits_alone_is_enough() {
         let (sent, pins) = (RefCell::new(Sent::default()), RefCell::new(vec![]));

@@ -3,7 +3,7 @@
 
 use firmware::reset::LastWords;
 
-/// Memory that survives a reset: start-up code leaves this section alone, any bits are valid in it, and it says itself which mean
-/// something.
+/// Memory that survives a reset: start-up code leaves this section alone, any bits are valid in it,
+/// and it says itself which mean something.
 #[unsafe(link_section = ".uninit.last_words")]
 pub(crate) static LAST_WORDS: LastWords = LastWords::new();

@@ -1,7 +1,9 @@
-//! On a board: the firmware (`app.rs` the tasks, `board` the wiring, `chip` the microcontroller). On a PC: a launcher that builds the image, flashes it
-//! through a debug probe and shows its log, so that `cargo run -p firmware --release` does what it says.
+//! On a board: the firmware (`app.rs` the tasks, `board` the wiring, `chip` the microcontroller).
+//! On a PC: a launcher that builds the image, flashes it through a debug probe and shows its log,
+//! so that `cargo run -p firmware --release` does what it says.
 #![cfg_attr(target_os = "none", no_std, no_main)]
-// Direct access to registers has its few places, each with its reason; everything else is held to the safe language.
+// Direct access to registers has its few places, each with its reason; everything else is held to
+// the safe language.
 #![deny(unsafe_code)]
 
 #[cfg(target_os = "none")]
@@ -24,7 +26,8 @@ mod last_words;
 static SHARED: firmware::tasks::shared::Shared =
     firmware::tasks::shared::Shared::new(&last_words::LAST_WORDS);
 
-// Before each line of the log: milliseconds since the tasks were started. They wrap after 49 days, and are 0 in start-up.
+// Before each line of the log: milliseconds since the tasks were started. They wrap after 49 days,
+// and are 0 in start-up.
 #[cfg(target_os = "none")]
 defmt::timestamp!("{=u32:ms}", SHARED.supervised_ms.load(core::sync::atomic::Ordering::Relaxed));
 

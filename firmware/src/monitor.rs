@@ -1,6 +1,7 @@
-//! The watch on amplifier and emergency stop, once a millisecond: the loop of the stop, the amplifier's
-//! ready output, the enable line as it is and not as it was set, and the motor's current where it is measured. Which of it
-//! keeps the device from being started, and which ends a run.
+//! The watch on amplifier and emergency stop, once a millisecond: the loop of the stop, the
+//! amplifier's ready output, the enable line as it is and not as it was set, and the motor's
+//! current where it is measured. Which of it keeps the device from being started, and which ends a
+//! run.
 
 use control_core::event::Fault;
 use control_core::interlock::Interlock;
@@ -28,7 +29,8 @@ pub struct Asked {
     pub code: DacCode,
 }
 
-/// Looks in a row that must agree: one may come between a change and what follows from it, or in a bounce.
+/// Looks in a row that must agree: one may come between a change and what follows from it, or in a
+/// bounce.
 const LOOKS: u8 = 2;
 /// The same for the current, which follows its command within a millisecond or two.
 const CURRENT_LOOKS: u8 = 3;
@@ -117,8 +119,8 @@ impl DriveMonitor {
         }
     }
 
-    /// True if the current is that of no command of the last looks, between the least and the largest of which it may be on
-    /// its way.
+    /// True if the current is that of no command of the last looks, between the least and the
+    /// largest of which it may be on its way.
     fn current_is_wrong(&mut self, current: Option<DacCode>, asked: Asked) -> bool {
         self.asked.rotate_right(1);
         self.asked[0] = Some(asked);

@@ -1,5 +1,6 @@
-//! The interface of a board: a port is one folder that implements [`Board`] for it, and names its pins in no other place.
-//! `embedded-hal` has the trait for the amplifier's enable line; what it has none for stands here.
+//! The interface of a board: a port is one folder that implements [`Board`] for it, and names its
+//! pins in no other place. `embedded-hal` has the trait for the amplifier's enable line; the traits
+//! that it lacks are here.
 
 use crate::drive::Converters;
 use crate::monitor::Readings;
@@ -72,7 +73,8 @@ pub trait ReadDrive {
 
 /// The supply's detector.
 pub trait SupplyLevel {
-    /// True if the supply is below the level at which the core surely runs, or nothing would end a core that it no longer carries.
+    /// True if the supply is below the level at which the core surely runs, or nothing would end a
+    /// core that it no longer carries.
     fn is_low(&self) -> bool;
 }
 
@@ -86,11 +88,13 @@ pub trait Watchdog {
 
 /// The lamps by which a person sees the device's state without a PC.
 pub trait Lamps {
-    /// Lights the one for torque, and the one for a fault that has latched or has ended the last run.
+    /// Lights the one for torque, and the one for a fault that has latched or has ended the last
+    /// run.
     fn show(&mut self, powered: bool, fault: bool);
 }
 
-/// The error of a serial port that would have to wait: there is nothing to read, or no room to write.
+/// The error of a serial port that would have to wait: there is nothing to read, or no room to
+/// write.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct WouldBlock;
 

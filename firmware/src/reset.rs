@@ -1,5 +1,6 @@
-//! The meaning of a reset: from the microcontroller's flags and the words that survive in RAM to the fault that is reported
-//! when the PC comes back. Torque is off after any reset until a person starts the device.
+//! The meaning of a reset: from the microcontroller's flags and the words that survive in RAM to
+//! the fault that is reported when the PC comes back. Torque is off after any reset until a person
+//! starts the device.
 
 use control_core::event::Fault;
 use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
@@ -20,7 +21,8 @@ pub struct ResetFlags {
     pub brownout: bool,
 }
 
-/// Words that no start-up code clears. After a power-up they hold anything: each says itself whether it means something.
+/// Words that no start-up code clears. After a power-up they hold anything: each says itself
+/// whether it means something.
 pub struct LastWords {
     /// The check of the others, then what [`words_of`] makes.
     crash: [AtomicU32; 1 + CRASH_WORDS],
@@ -157,7 +159,8 @@ impl LastWords {
     }
 }
 
-/// The fault to report for the last reset; `None` where it was a person's (power, the button, a debugger).
+/// The fault to report for the last reset; `None` where it was a person's (power, the button, a
+/// debugger).
 pub fn cause(flags: ResetFlags, crash: Option<&Crash>, torque_was_on: bool) -> Option<Fault> {
     let hung = crash.is_some_and(|crash| crash.kind == CrashKind::HungTask);
     if hung || (flags.watchdog && crash.is_none()) {

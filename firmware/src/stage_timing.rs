@@ -1,10 +1,11 @@
-//! Last and longest time of each stage, kept where the stage runs and read where it is reported, without a lock.
+//! Last and longest time of each stage, kept where the stage runs and read where it is reported,
+//! without a lock.
 
 use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
 use link::frames::{STAGES, Stage, StageTime};
 
-/// Times of every stage. Each stage has one writer; a reader that resets the longest time may lose one that is being
-/// written, which the next one brings back.
+/// Times of every stage. Each stage has one writer; a reader that resets the longest time may lose
+/// one that is being written, which the next one brings back.
 pub struct Stages {
     last: [AtomicU32; STAGES],
     longest: [AtomicU32; STAGES],

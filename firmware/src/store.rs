@@ -1,13 +1,16 @@
-//! The configuration in flash: two records, what was found of the device and whom it was set for last, each with versions of
-//! its own. Both live in two slots (sectors), each a row of cells, a cell for each version ever saved. A cell is written
-//! once, its last word last; losing power at any point leaves the record that was or the one that comes, never a mixture.
-//! A slot is erased at start-up, before the tick and the watchdog run, and where no cell is left: an erasure stops the
+//! The configuration in flash: two records, what was found of the device and whom it was set for
+//! last, each with versions of its own. Both live in two slots (sectors), each a row of cells, a
+//! cell for each version ever saved. A cell is written once, its last word last; losing power at
+//! any point leaves the record that was or the one that comes, never a mixture. A slot is erased at
+//! start-up, before the tick and the watchdog run, and where no cell is left: an erasure stops the
 //! processor for a second or two, and whoever saves sees to it that torque is off meanwhile.
 //!
-//! Below it, the flash has the traits of `embedded-storage` ([`Nor`]), so that another store, such as `sequential-storage`, can take this
-//! one's place. This one is kept for three things: a bit that flips in the record saved last is told from a record that was never
-//! finished, so that a device never quietly runs on an older one; it is read and written without waiting in between, in a task
-//! that the watchdog looks after, and reports progress with every word; and its tests cut the power at every single write.
+//! Below it, the flash has the traits of `embedded-storage` ([`Nor`]), so that another store, such
+//! as `sequential-storage`, can take this one's place. This one is kept for three things: a bit
+//! that flips in the record saved last is distinguished from a record that was never finished, so
+//! that a device never quietly runs on an older one; it is read and written without waiting in
+//! between, in a task that the watchdog looks after, and reports progress with every word; and its
+//! tests cut the power at every single write.
 
 mod nor;
 
@@ -163,7 +166,8 @@ fn is_later(a: u32, b: u32) -> bool {
 }
 
 impl<F: ConfigFlash> Store<F> {
-    /// Finds the versions saved last and makes room for the next ones. Erases, so that it may take seconds.
+    /// Finds the versions saved last and makes room for the next ones. Erases, so that it may take
+    /// seconds.
     pub fn open(flash: F) -> (Self, Stored<Device>, Stored<Patient>) {
         let mut store = Self { flash, slot: Slot::A, newest: [None; 2], next_cell: 0, next_sequence: 0 };
         let [device_damaged, patient_damaged] = store.find();
@@ -179,8 +183,8 @@ impl<F: ConfigFlash> Store<F> {
         self.flash
     }
 
-    /// Saves the device's part unless it is what was saved last. Takes as long as the flash takes for its words; where no cell
-    /// is left, as long as an erasure.
+    /// Saves the device's part unless it is what was saved last. Takes as long as the flash takes
+    /// for its words; where no cell is left, as long as an erasure.
     pub fn save_device(&mut self, device: &Device) -> Result<(), StoreError> {
         self.save(Kind::Device, device)
     }
@@ -298,7 +302,8 @@ impl<F: ConfigFlash> Store<F> {
         }
     }
 
-    /// Finds the newest versions, the slot to write to and the cell; whether each record has lost its last version.
+    /// Finds the newest versions, the slot to write to and the cell; whether each record has lost
+    /// its last version.
     fn find(&mut self) -> [bool; 2] {
         let mut last: Option<(u32, Slot)> = None;
         for (slot, cell) in cells::<F>() {
@@ -327,8 +332,8 @@ impl<F: ConfigFlash> Store<F> {
         Kind::ALL.map(|kind| self.is_damaged(kind))
     }
 
-    /// True if a version of the record that was committed after its newest whole one cannot be read. The other slot does not
-    /// count: it may be half erased.
+    /// True if a version of the record that was committed after its newest whole one cannot be
+    /// read. The other slot does not count: it may be half erased.
     fn is_damaged(&mut self, kind: Kind) -> bool {
         let from = match self.newest[kind as usize] {
             Some(newest) if newest.slot == self.slot => newest.cell + 1,

@@ -1,5 +1,5 @@
-//! Who has to report before the watchdog is fed, and what is wrong when one does not. One missing task is enough: a
-//! device that half works does not hold torque.
+//! Who has to report before the watchdog is fed, and what is wrong when one does not. One missing
+//! task is enough: a device that half works does not hold torque.
 
 use crate::timing;
 use control_core::event::Fault;
@@ -71,8 +71,9 @@ impl Supervisor {
         Self { silent_ms: [0; Task::ALL.len()], hung: None }
     }
 
-    /// A millisecond has passed: the watchdog may be fed, or the task that hangs. Once one has hung, the watchdog is never
-    /// fed again: whatever else that task has left undone, only a reset puts right.
+    /// A millisecond has passed: the watchdog may be fed, or the task that hangs. Once one has
+    /// hung, the watchdog is never fed again: whatever else that task has left undone, only a reset
+    /// puts right.
     pub fn look(&mut self, reports: &Reports) -> Result<(), Task> {
         let reported = reports.take();
         for (task, silent) in Task::ALL.into_iter().zip(&mut self.silent_ms) {
@@ -107,14 +108,16 @@ impl Trips {
         self.0.load(Relaxed) == 0
     }
 
-    /// The fault with the lowest number; the others of the same moment follow from it and are forgotten.
+    /// The fault with the lowest number; the others of the same moment follow from it and are
+    /// forgotten.
     pub fn take(&self) -> Option<Fault> {
         let raised = self.0.swap(0, Relaxed);
         Fault::ALL.get(raised.trailing_zeros() as usize).copied()
     }
 }
 
-/// The conditions under which no torque is given, as the tasks that see them say; read by the tick and by telemetry.
+/// The conditions under which no torque is given, as the tasks that see them say; read by the tick
+/// and by telemetry.
 #[derive(Default)]
 pub struct Conditions(AtomicU16);
 

@@ -1,4 +1,5 @@
-//! The work of the tasks. None of them knows a pin; only the tick may give torque, and it alone touches the drive.
+//! The work of the tasks. None of them knows a pin; only the tick may give torque, and it alone
+//! touches the drive.
 
 pub mod queues;
 pub mod shared;

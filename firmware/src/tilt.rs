@@ -1,5 +1,5 @@
-//! The inclination of the insertion axis, from either accelerometer of the STM32F4DISCOVERY or from an analogue
-//! inclinometer, and what is wrong with a sensor that does not give it.
+//! The inclination of the insertion axis, from either accelerometer of the STM32F4DISCOVERY or from
+//! an analogue inclinometer, and what is wrong with a sensor that does not give it.
 
 mod accelerometer;
 mod angle;
@@ -12,8 +12,8 @@ pub use watch::{Reading, TiltWatch};
 
 use control_core::units::Milliradians;
 
-/// Something that measures the inclination. Called from the tilt task at `TILT_PERIOD_MS`; it may wait
-/// for a bus, not for a measurement.
+/// Something that measures the inclination. Called from the tilt task at `TILT_PERIOD_MS`; it may
+/// wait for a bus, not for a measurement.
 pub trait TiltSource {
     /// The latest measurement.
     fn read(&mut self) -> Reading;
@@ -41,8 +41,8 @@ pub struct Acceleration {
     pub z_mg: i32,
 }
 
-/// Low-pass over the measurements, an eighth of the difference at a time: 80 ms at 100 Hz. It turns the 18 mg steps of
-/// the coarser accelerometer into a few milliradians. Holds 1/256 mrad.
+/// Low-pass over the measurements, an eighth of the difference at a time: 80 ms at 100 Hz. It turns
+/// the 18 mg steps of the coarser accelerometer into a few milliradians. Holds 1/256 mrad.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Smoother(Option<i32>);
 

@@ -1,12 +1,13 @@
-//! Every timing constant of the firmware, each with its reason. Nothing else in this crate states a frequency, a period,
-//! a time-out or a priority.
+//! Every timing constant of the firmware, each with its reason. Nothing else in this crate states a
+//! frequency, a period, a time-out or a priority.
 
 use control_core::TICK_HZ;
 
 /// The frequency of the board's external clock: a crystal, or the clock of its debugger.
 pub const EXTERNAL_CLOCK_HZ: u32 = 8_000_000;
 
-/// The most that an STM32F407 runs at, and an STM32F429 without over-drive; the cycle counter counts it.
+/// The most that an STM32F407 runs at, and an STM32F429 without over-drive; the cycle counter
+/// counts it.
 pub const CORE_HZ: u32 = 168_000_000;
 
 /// The most that the APB1 bus allows.
@@ -21,82 +22,97 @@ pub const TICK_TIMER_HZ: u32 = 2 * APB1_HZ;
 /// Cycles from one tick to the next: 16,800.
 pub const TICK_CYCLES: u32 = CORE_HZ / TICK_HZ;
 
-/// Counts of the tick's timer from one tick to the next: 8,400, which divides without a rest, so that the rate is as
-/// exact as the crystal.
+/// Counts of the tick's timer from one tick to the next: 8,400, which divides without a rest, so
+/// that the rate is as exact as the crystal.
 pub const TICK_TIMER_COUNTS: u32 = TICK_TIMER_HZ / TICK_HZ;
 
-/// From the tick's edge to the instant at which the 12-bit converter takes the code, by hardware: 20 µs. Whatever the tick
-/// computes and whatever masked it for a few microseconds, the motor is driven at equal distances. Longer than the longest
-/// tick with the longest masking before it, short against the tick's period.
+/// From the tick's edge to the instant at which the 12-bit converter takes the code, by hardware:
+/// 20 µs. Whatever the tick computes and whatever masked it for a few microseconds, the motor is
+/// driven at equal distances. Longer than the longest tick with the longest masking before it,
+/// short against the tick's period.
 pub const OUTPUT_CYCLES: u32 = CORE_HZ / 50_000;
 
 /// Two ticks further apart than this are not neighbours: a period and a half.
 pub(crate) const TICK_MISSED_CYCLES: u32 = TICK_CYCLES + TICK_CYCLES / 2;
 
-/// Rate of the supervisor, and of everything that it sets off: often enough that its 1 ms is small against the 20 ms in
-/// which a hung task must have lost its torque, seldom enough to cost nothing.
+/// Rate of the supervisor, and of everything that it sets off: often enough that its 1 ms is small
+/// against the 20 ms in which a hung task must have lost its torque, seldom enough to cost nothing.
 pub const SUPERVISOR_HZ: u32 = 1_000;
 
-/// The tilt sensor is read at twice the 100 Hz at which it measures: no measurement is missed, whatever its clock does.
+/// The tilt sensor is read at twice the 100 Hz at which it measures: no measurement is missed,
+/// whatever its clock does.
 pub(crate) const TILT_PERIOD_MS: u32 = 5;
 
-/// The time for which the tick may be silent before the supervisor calls it hung: it runs ten times in that time. A tick that never
-/// returns starves the supervisor too, and is left to the watchdog.
+/// The time for which the tick may be silent before the supervisor calls it hung: it runs ten times
+/// in that time. A tick that never returns starves the supervisor too, and is left to the watchdog.
 pub(crate) const TICK_SILENCE_MS: u32 = 2;
 
-/// The time for which the USB and telemetry tasks may be silent: both run every millisecond, and five of them are more than the
-/// longest of either ever measured, yet leave time to act within 20 ms.
+/// The time for which the USB and telemetry tasks may be silent: both run every millisecond, and
+/// five of them are more than the longest of either ever measured, yet leave time to act within 20
+/// ms.
 pub(crate) const TASK_SILENCE_MS: u32 = 5;
 
 /// The time for which the tilt task may be silent: two of its periods and a millisecond.
 pub(crate) const TILT_SILENCE_MS: u32 = 2 * TILT_PERIOD_MS + 1;
 
-/// Ticks without a sign of the supervisor after which the tick takes torque away by itself: 5 ms. It is what catches a task
-/// that keeps the supervisor from running, for instance a USB stack that waits for a flag with interrupts masked.
+/// Ticks without a sign of the supervisor after which the tick takes torque away by itself: 5 ms.
+/// It is what catches a task that keeps the supervisor from running, for instance a USB stack that
+/// waits for a flag with interrupts masked.
 pub(crate) const SUPERVISOR_SILENCE_TICKS: u32 = 50;
 
-/// The independent watchdog, nominal. Its oscillator runs at 17 to 47 kHz instead of 32: 10 ms lie between 6.8 ms, still
-/// several periods of the supervisor, and 18.8 ms, still within the 20 ms for a hung task.
+/// The independent watchdog, nominal. Its oscillator runs at 17 to 47 kHz instead of 32: 10 ms lie
+/// between 6.8 ms, still several periods of the supervisor, and 18.8 ms, still within the 20 ms for
+/// a hung task.
 pub const WATCHDOG_MS: u32 = 10;
 
-/// The same while a sector of flash is erased, which stops the processor for up to 2.6 s: 5 s lie between 3.4 and 9.4 s.
-/// Torque is off then.
+/// The same while a sector of flash is erased, which stops the processor for up to 2.6 s: 5 s lie
+/// between 3.4 and 9.4 s. Torque is off then.
 pub const WATCHDOG_ERASE_MS: u32 = 5_000;
 
-/// Longest wait for the watchdog to take another time, in turns of a loop that reads a register: ten cycles of its clock
-/// take 0.6 ms at most. One that does not run has no clock and never takes it: then it is not needed either.
+/// Longest wait for the watchdog to take another time, in turns of a loop that reads a register:
+/// ten cycles of its clock take 0.6 ms at most. One that does not run has no clock and never takes
+/// it: then it is not needed either.
 pub const WATCHDOG_SETTLE_TURNS: u32 = 20_000;
 
-/// A pull of 40 kΩ and a wire of 200 pF: 8 µs to the level at which an input changes. Wait this long, in cycles: 20 µs.
+/// A pull of 40 kΩ and a wire of 200 pF: 8 µs to the level at which an input changes. Wait this
+/// long, in cycles: 20 µs.
 pub const PULL_SETTLE_CYCLES: u32 = CORE_HZ / 50_000;
 
-/// Filter of the encoder's inputs (RM0090 18.4.7, ICxF): eight samples at a quarter of the timer's clock, 0.38 µs. A glitch from
-/// the motor's PWM leads is shorter; an edge of a needle at 1 m/s lasts 31 µs.
+/// Filter of the encoder's inputs (RM0090 18.4.7, ICxF): eight samples at a quarter of the timer's
+/// clock, 0.38 µs. A glitch from the motor's PWM leads is shorter; an edge of a needle at 1 m/s
+/// lasts 31 µs.
 pub const ENCODER_FILTER: u8 = 0b0111;
 
-/// Readings that fail in a row before the tilt sensor counts as broken: 50 ms. One bad transfer is no reason to drop torque.
+/// Readings that fail in a row before the tilt sensor counts as broken: 50 ms. One bad transfer is
+/// no reason to drop torque.
 pub(crate) const TILT_BAD_READINGS: u32 = 10;
 
-/// Readings without a new measurement before the tilt sensor counts as stuck: 100 ms, ten measurements.
+/// Readings without a new measurement before the tilt sensor counts as stuck: 100 ms, ten
+/// measurements.
 pub(crate) const TILT_STALE_READINGS: u32 = 20;
 
-/// Equal measurements before a sensor that resolves its own noise (LIS3DSH, 0.06 mg) counts as stuck: half a second.
+/// Equal measurements before a sensor that resolves its own noise (LIS3DSH, 0.06 mg) counts as
+/// stuck: half a second.
 pub(crate) const TILT_FROZEN_MEASUREMENTS: u32 = 50;
 
-/// Clock of the tilt sensor's SPI, at most; both revisions allow 10 MHz, and a slow edge rings less.
+/// Clock of the tilt sensor's SPI, at most; both revisions allow 10 MHz, and a slow edge rings
+/// less.
 pub const TILT_SPI_HZ: u32 = 1_500_000;
 
-/// Longest time in which the configuration's flash takes a word (data sheet: 100 µs), in turns of a loop that reads a
-/// register, with a wide margin; a flash that is busy for longer is broken.
+/// Longest time in which the configuration's flash takes a word (data sheet: 100 µs), in turns of a
+/// loop that reads a register, with a wide margin; a flash that is busy for longer is broken.
 pub const FLASH_WORD_TURNS: u32 = 100_000;
 
-/// Longest time in which it erases a sector of 128 KiB, 16 bits at a time (data sheet: 2.6 s), in the same turns.
+/// Longest time in which it erases a sector of 128 KiB, 16 bits at a time (data sheet: 2.6 s), in
+/// the same turns.
 pub const FLASH_ERASE_TURNS: u32 = 400_000_000;
 
-/// Priorities of the tasks, 1 the lowest. The tick is above everything; the supervisor is above whatever it has to watch. No
-/// critical section of RTIC masks the tick. PRIMASK does: the USB core polls its registers with all interrupts masked
-/// (`synopsys-usb-otg`), and the erasure's watchdog is set so. The longest such stretch is measured on the image
-/// (`nothing_masks_the_tick_for_longer_than_the_latch_waits`), and a code that comes after the latch all the same is counted.
+/// Priorities of the tasks, 1 the lowest. The tick is above everything; the supervisor is above
+/// whatever it has to watch. No critical section of RTIC masks the tick. PRIMASK does: the USB core
+/// polls its registers with all interrupts masked (`synopsys-usb-otg`), and the erasure's watchdog
+/// is set so. The longest such stretch is measured on the image
+/// (`nothing_masks_the_tick_for_longer_than_the_latch_waits`), and a code that comes after the
+/// latch all the same is counted.
 pub mod priority {
     /// The control tick. Only PRIMASK masks it.
     pub const TICK: u8 = 16;

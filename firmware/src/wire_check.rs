@@ -1,5 +1,5 @@
-//! Finds a wire that is off: a line that somebody drives stays where it is whichever way it is pulled, one without a wire
-//! goes along. And whether the encoder has power.
+//! Finds a wire that is off: a line that somebody drives stays where it is whichever way it is
+//! pulled, one without a wire goes along. And whether the encoder has power.
 
 /// Which way the inputs are pulled, by some 40 kΩ.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -13,7 +13,8 @@ pub enum Pull {
 pub trait PulledLines {
     /// All of them, a bit each.
     const ALL: u8;
-    /// True if the encoder's supply is there, as far as it is wired to be sensed: without that wire it is not.
+    /// True if the encoder's supply is there, as far as it is wired to be sensed: without that wire
+    /// it is not.
     fn has_supply(&self) -> bool;
     /// Those that are high, a bit each.
     fn high(&mut self) -> u8;
@@ -23,10 +24,12 @@ pub trait PulledLines {
     fn settle(&mut self);
 }
 
-/// Looks that must agree: an edge of a line that is driven may fall between two readings of one look, but hardly in two.
+/// Looks that must agree: an edge of a line that is driven may fall between two readings of one
+/// look, but hardly in two.
 const LOOKS: u8 = 2;
 
-/// Looks in a row for which the supply must have been there before its absence means anything: 0.1 s.
+/// Looks in a row for which the supply must have been there before its absence means anything: 0.1
+/// s.
 const SUPPLY_LOOKS: u8 = 100;
 
 /// The finding of a look.
@@ -34,8 +37,8 @@ const SUPPLY_LOOKS: u8 = 100;
 pub struct Wires {
     /// A wire is off, or the encoder has lost its supply.
     pub off: bool,
-    /// All lines are at one level. Where they are not, one is held high and another low, both against their pulls, and the
-    /// encoder has power.
+    /// All lines are at one level. Where they are not, one is held high and another low, both
+    /// against their pulls, and the encoder has power.
     pub agree: bool,
 }
 
@@ -76,7 +79,8 @@ impl WireWatch {
     }
 }
 
-/// The lines that are high against a pull down, and those that go up, down and up again as they are pulled. Leaves them pulled up.
+/// The lines that are high against a pull down, and those that go up, down and up again as they are
+/// pulled. Leaves them pulled up.
 fn pulled(lines: &mut impl PulledLines) -> (u8, u8) {
     let high = lines.high();
     if high == 0 {

@@ -1,6 +1,7 @@
-//! The board itself: `cargo xtask board-test [--board NAME]`, with a debug probe and a board beside it. Wire PA4 to PC2, the emergency
-//! stop, the amplifier's ready line and the strap of the current monitor to 3 V (PE4, PE5, PE6; on the NUCLEO-F429ZI PF14, PF15,
-//! PF12), plug the board's own USB connector (CN5; CN13) into a PC, and leave the amplifier off.
+//! The board itself: `cargo xtask board-test [--board NAME]`, with a debug probe and a board beside
+//! it. Wire PA4 to PC2, the emergency stop, the amplifier's ready line and the strap of the current
+//! monitor to 3 V (PE4, PE5, PE6; on the NUCLEO-F429ZI PF14, PF15, PF12), plug the board's own USB
+//! connector (CN5; CN13) into a PC, and leave the amplifier off.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 #![allow(unexpected_cfgs, reason = "the macro of embedded-test asks for one of its own")]
 
@@ -50,7 +51,8 @@ mod tests {
 
     type Parts = chip::Parts<Wires>;
 
-    /// Flash that feeds the watchdog with every word that is read: looking through two sectors takes longer than it waits.
+    /// Flash that feeds the watchdog with every word that is read: looking through two sectors
+    /// takes longer than it waits.
     struct Fed<F, W> {
         flash: F,
         watchdog: RefCell<W>,
@@ -95,7 +97,8 @@ mod tests {
         cortex_m::asm::delay(timing::TICK_CYCLES / 2);
     }
 
-    /// PA4 on PC2: each code comes back as itself, to both ends, with the amplifier off all the time.
+    /// PA4 on PC2: each code comes back as itself, to both ends, with the amplifier off all the
+    /// time.
     #[test]
     fn the_converter_gives_code_for_code(mut parts: Parts) {
         for code in (1..=4095).step_by(23) {
@@ -120,7 +123,8 @@ mod tests {
         assert!(!readings.enable_line, "the enable line is high");
     }
 
-    /// The most cycles of the control law by state, over an insertion and a withdrawal; `before` is done before each tick.
+    /// The most cycles of the control law by state, over an insertion and a withdrawal; `before` is
+    /// done before each tick.
     fn law_cycles(watchdog: &mut impl Watchdog, mut before: impl FnMut()) -> [u32; 8] {
         let Ok(plan) = Plan::new(&Device::commissioned_virtual(), &Patient::default()) else {
             panic!("the default is sound")
@@ -143,8 +147,8 @@ mod tests {
         longest
     }
 
-    /// With the tick's code in the flash's cache, and with none of it there: in the image it is somewhere between, for the tick's code is
-    /// more than the cache holds. Prints both.
+    /// With the tick's code in the flash's cache, and with none of it there: in the image it is
+    /// somewhere between, for the tick's code is more than the cache holds. Prints both.
     #[test]
     fn the_law_takes_its_cycles(mut parts: Parts) {
         let mut flash = parts.store.close().0;
@@ -162,7 +166,8 @@ mod tests {
         );
     }
 
-    /// In sectors that hold nothing else, which are blank again afterwards; the device that is saved is not a commissioned one.
+    /// In sectors that hold nothing else, which are blank again afterwards; the device that is
+    /// saved is not a commissioned one.
     #[test]
     #[timeout(20)]
     fn a_configuration_is_saved_and_found_again(parts: Parts) {
@@ -187,7 +192,8 @@ mod tests {
         }
     }
 
-    /// In a PC: configured within five seconds. Prints the longest look at the core, which masks the tick at worst.
+    /// In a PC: configured within five seconds. Prints the longest look at the core, which masks
+    /// the tick at worst.
     #[test]
     #[timeout(10)]
     fn usb_enumerates(mut parts: Parts) {

@@ -1,5 +1,5 @@
-//! The virtual device for a while, as `run` drives it, and a hash (FNV-1a) of every byte that it sent: what the same device
-//! in a browser has to equal. `device_digest PROFILE TICKS`.
+//! The virtual device for a while, as `run` drives it, and a hash (FNV-1a) of every byte that it
+//! sent: what the same device in a browser has to equal. `device_digest PROFILE TICKS`.
 
 use device_sim::device::virtual_device::VirtualDevice;
 use device_sim::driver::Driver;

@@ -1,6 +1,6 @@
-//! The hot paths whose instructions `cargo xtask counts` counts under callgrind: `hot_paths PATH`, or
-//! `hot_paths filter whole` for a diagnosis to its end. Each is a function that is
-//! never inlined, by whose name counting is turned on, and does the same work at every run.
+//! The hot paths whose instructions `cargo xtask counts` counts under callgrind: `hot_paths PATH`,
+//! or `hot_paths filter whole` for a diagnosis to its end. Each is a function that is never
+//! inlined, by whose name counting is turned on, and does the same work at every run.
 
 use control_core::controller::{Order, Sample, TickInput};
 use control_core::units::Counts;
@@ -48,7 +48,8 @@ fn main() {
         // By the calls of the filter: how often it is called is not what is counted.
         "filter" => {
             let (rig, fit, held) = (rig(), recording(0.0), recording(1.0));
-            // The refit of the nominal model calls it often enough: what follows would take a minute under callgrind.
+            // The refit of the nominal model calls it often enough: what follows would take a
+            // minute under callgrind.
             let until_refitted = |_: &str, done: f64| {
                 if done > REFITTED && std::env::args().len() == 2 {
                     std::process::exit(0);

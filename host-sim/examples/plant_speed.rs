@@ -1,5 +1,5 @@
-//! Ticks of plant and control core together, a second: on one thread, how it scales over two, and the time of one, ten and a
-//! hundred times as many.
+//! Ticks of plant and control core together, a second: on one thread, how it scales over two, and
+//! the time of one, ten and a hundred times as many.
 //!
 //! `cargo run --release -p host-sim --example plant_speed`
 

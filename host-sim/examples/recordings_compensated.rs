@@ -1,12 +1,14 @@
-//! The predicted effect of feedforward on the forces of real machines: diagnosed from recordings to fit, judged on
-//! recordings that were held out, compared with a raw map of the same recordings.
+//! The predicted effect of feedforward on the forces of real machines: diagnosed from recordings to
+//! fit, judged on recordings that were held out, compared with a raw map of the same recordings.
 //!
 //!     cargo run --release -p host-sim --example recordings_compensated -- RECORDINGS [CASE…]
 //!
-//! A case is `emps`, `anticogging` or a folder of `machines`. `docs/recordings.md` says where they come from. The force that a machine needs apart from its inertia is
-//! `gain·u − J·a + external`; what is fed forward is the law of `docs/compensation.md` with the usual gains, in floating point. The raw map is
-//! the mean of that force over 64 places of a turn (or of the travel) and both directions, at a gain of 1. Neither knows where a
-//! held-out recording begins: the place is fitted on its first two fifths, and the rest judges. Rows that hardly move do not count.
+//! A case is `emps`, `anticogging` or a folder of `machines`. `docs/recordings.md` says where they
+//! come from. The force that a machine needs apart from its inertia is `gain·u − J·a + external`;
+//! what is fed forward is the law of `docs/compensation.md` with the usual gains, in floating
+//! point. The raw map is the mean of that force over 64 places of a turn (or of the travel) and
+//! both directions, at a gain of 1. Neither knows where a held-out recording begins: the place is
+//! fitted on its first two fifths, and the rest judges. Rows that hardly move do not count.
 
 use diagnosis::effects::{Effect, EffectName};
 use diagnosis::recording::Recording;
@@ -200,7 +202,7 @@ fn fed_forward(rig: &Rig, row: &Row, shift: f64) -> f64 {
 fn waves(effect: &Effect, position: f64) -> f64 {
     let mut waves = effect.waves();
     if waves.is_empty() {
-        let turn = effect.shape.get("turn").copied().unwrap_or(std::f64::consts::TAU);
+        let turn = effect.turn().unwrap_or(std::f64::consts::TAU);
         waves.push(("1".into(), std::f64::consts::TAU / turn));
     }
     let value = |key: String| effect.coefficients.get(&key).copied().unwrap_or(0.0);

@@ -1,5 +1,5 @@
 // The steps of a guide, wherever its page is: says what comes next, and begins a step when the person says so. The page has the
-// elements `steps`, `end` and `leave` and the template `step`. What a guide says stands in host-sim/device-sim/src/page/guide.rs.
+// elements `steps`, `end` and `leave` and the template `step`. The texts of a guide are in host-sim/device-sim/src/page/guide.rs.
 
 const byId = (id) => document.getElementById(id);
 const GOING = { hand: "Do it now; the device watches until you are done.", motor: "The motor moves: hands off." };

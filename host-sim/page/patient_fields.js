@@ -68,7 +68,7 @@ export class PatientFields {
     input.value = String(object[key]);
     input.dataset.key = key;
     input.addEventListener("input", () => {
-      // An empty field is no number: the device is asked for what stands here, and says what is wrong with it.
+      // An empty field is no number: the device is asked for the text here, and says what is wrong with it.
       object[key] = input.value === "" ? null : Number(input.value);
       if (object[key] === null) delete object[key];
       this.edited();

@@ -80,7 +80,7 @@ export class Practice {
     this.list();
   }
 
-  /** An insertion has ended. After a reconnection all are told again. */
+  /** An insertion has ended. After a reconnection all are reported again. */
   ended(attempt) {
     if (attempt.number === 1) this.attempts.length = 0;
     this.attempts.push(attempt);

@@ -1,4 +1,4 @@
-// The tasks of a procedure beside moving the needle (tourniquet, plunger, catheter): a button for each. What was done is told by the server,
+// The tasks of a procedure beside moving the needle (tourniquet, plunger, catheter): a button for each. The server reports what was done,
 // for the scripted hand does them too.
 
 import { capital, t, taskName } from "./language.js";

@@ -1,5 +1,5 @@
-//! The command line of the needle device's PC side. It parses, calls the library, prints, and turns errors into one line
-//! and an exit status.
+//! The command line of the needle device's PC side. It parses, calls the library, prints, and turns
+//! errors into one line and an exit status.
 
 mod cli;
 

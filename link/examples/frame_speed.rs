@@ -1,5 +1,6 @@
-//! Samples a second that become frames and frames that become samples again, and by turns with it, as its peer, postcard
-//! alone on the same blocks: no checksum, no COBS, no number, no search for the end of a frame.
+//! Samples a second that become frames and frames that become samples again, and by turns with it,
+//! as its peer, postcard alone on the same blocks: no checksum, no COBS, no number, no search for
+//! the end of a frame.
 //!
 //! `cargo run --release -p link --example frame_speed`
 

@@ -1,5 +1,6 @@
-//! Throws damaged frames at both ends of the link for a while: `cargo run --release -p link --example fuzz_frames --
-//! --seconds 60 [--seed N]`. Nothing may panic, and after any damage the next whole frame must be read.
+//! Throws damaged frames at both ends of the link for a while: `cargo run --release -p link
+//! --example fuzz_frames -- --seconds 60 [--seed N]`. Nothing may panic, and after any damage the
+//! next whole frame must be read.
 
 use control_core::compensation::{Gain, Gains};
 use control_core::config::Config;

@@ -1,7 +1,9 @@
-//! The commit that a program was built from, so that a recording or a report says which one made it.
+//! The commit that a program was built from, so that a recording or a report says which one made
+//! it.
 //!
-//! `cargo xtask dist` names it in the variable `NEEDLE_BUILD`: eight hexadecimal digits, with a `+` behind them if the sources had been
-//! changed since. Without that variable the commit is unknown, and nothing is built anew for each commit.
+//! `cargo xtask dist` names it in the variable `NEEDLE_BUILD`: eight hexadecimal digits, with a `+`
+//! behind them if the sources had been changed since. Without that variable the commit is unknown,
+//! and nothing is built anew for each commit.
 
 use core::fmt;
 use serde::{Deserialize, Serialize};

@@ -17,7 +17,8 @@ const OVERHEAD: usize = 2 + MAX_FRAME / 254;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TooLong;
 
-/// Writes `frame` to the beginning of `out`; the number of bytes. Nothing longer than [`MAX_FRAME`] is written.
+/// Writes `frame` to the beginning of `out`; the number of bytes. Nothing longer than [`MAX_FRAME`]
+/// is written.
 pub fn encode<F: Serialize>(frame: &F, out: &mut [u8]) -> Result<usize, TooLong> {
     let mut plain = [0; MAX_FRAME - OVERHEAD];
     let room = plain.get_mut(..MAX_FRAME - OVERHEAD - CRC_BYTES).ok_or(TooLong)?;
@@ -56,7 +57,8 @@ impl Default for Decoder {
 }
 
 impl Decoder {
-    /// Takes a byte; at the end of a frame, the frame or the word that it was none. Empty frames are passed over.
+    /// Takes a byte; at the end of a frame, the frame or the word that it was none. Empty frames
+    /// are passed over.
     pub fn push<F: DeserializeOwned>(&mut self, byte: u8) -> Option<Result<F, Garbage>> {
         if byte != 0 {
             match self.buffer.get_mut(self.filled) {
@@ -76,8 +78,8 @@ impl Decoder {
         Some(decode(coded))
     }
 
-    /// Takes bytes from the front of `bytes` up to the end of a frame, as [`Self::push`] does one by one: `None` where they end
-    /// before that. On a PC that is faster than a call for each byte.
+    /// Takes bytes from the front of `bytes` up to the end of a frame, as [`Self::push`] does one
+    /// by one: `None` where they end before that. On a PC that is faster than a call for each byte.
     pub fn take<F: DeserializeOwned>(&mut self, bytes: &mut &[u8]) -> Option<Result<F, Garbage>> {
         while let Some((piece, rest)) = bytes
             .iter()

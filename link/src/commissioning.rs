@@ -1,7 +1,8 @@
-//! The rules by which a device becomes commissioned and stays so. No command makes it so: the device plays gentle pulses, sees in
-//! its own counts that the motor drives them the way it is asked to (`Proof`), and only then takes
-//! [`crate::Command::Commission`]. From then on a command may lower its ceilings and not raise them
-//! ([`control_core::ceilings`]). A record that the device has sent carries its seal ([`Record`]) and is taken back.
+//! The rules by which a device becomes commissioned and stays so. No command makes it so: the
+//! device plays gentle pulses, sees in its own counts that the motor drives them the way it is
+//! asked to (`Proof`), and only then takes [`crate::Command::Commission`]. From then on a command
+//! may lower its ceilings and not raise them ([`control_core::ceilings`]). A record that the device
+//! has sent carries its seal ([`Record`]) and is taken back.
 
 use crate::frames::CommandRefusal;
 use control_core::Device;
@@ -13,7 +14,8 @@ pub use crate::record::Record;
 
 /// The least way of the roller that shows anything, in counts.
 const LEAST_COUNTS: u32 = 20;
-/// The factor by which the most work must exceed the size of the least, and the work that remains at the end.
+/// The factor by which the most work must exceed the size of the least, and the work that remains
+/// at the end.
 const CLEARLY: i64 = 4;
 
 /// Checks that a command may replace `before` by `after`.
@@ -29,8 +31,9 @@ pub(crate) fn may_become(before: &Device, after: &Device) -> Result<(), CommandR
 
 /// The evidence that the device has gathered about itself while it played.
 ///
-/// From rest, the work that the torque has done is the roller's energy and what friction took: never negative where the motor
-/// drives the way that the encoder counts, never positive where it does not.
+/// From rest, the work that the torque has done is the roller's energy and what friction took:
+/// never negative where the motor drives the way that the encoder counts, never positive where it
+/// does not.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum Proof {
     /// Nothing.
@@ -75,7 +78,8 @@ impl Pulses {
     fn show(&self) -> bool {
         let has_moved = self.span.1.abs_diff(self.span.0) >= LEAST_COUNTS;
         let (least, most) = self.bounds;
-        // What is left at the end has gone into friction: a roller that runs on by itself leaves nothing.
+        // The rest at the end has gone into friction: a roller that runs on by itself leaves
+        // nothing.
         has_moved && self.driven == (true, true) && most > -least * CLEARLY && self.work * CLEARLY > most
     }
 }
@@ -111,8 +115,8 @@ impl Proof {
         }
     }
 
-    /// Another configuration is another device, but for what the pulses give: the converter's zero, what moves, and the stiffness
-    /// that it bears, which may be less.
+    /// Another configuration is another device, but for what the pulses give: the converter's zero,
+    /// what moves, and the stiffness that it bears, which may be less.
     pub(crate) fn keep(&mut self, before: &Device, after: &Device) {
         let mut same = Device { dac_zero: after.dac_zero, mechanism: after.mechanism, ..*before };
         same.limits.stiffness = before.limits.stiffness.min(after.limits.stiffness);

@@ -1,13 +1,16 @@
-//! The record of a crash: what the firmware leaves in RAM when it gives up, and sends after the hello of its next start.
+//! The record of a crash: what the firmware leaves in RAM when it gives up, and sends after the
+//! hello of its next start.
 
 use core::fmt;
 use heapless::String;
 use serde::{Deserialize, Serialize};
 
-/// Bytes of the end of a source file's path that a record keeps: enough for its folder and its name.
+/// Bytes of the end of a source file's path that a record keeps: enough for its folder and its
+/// name.
 pub const FILE_BYTES: usize = 40;
 
-/// `BFARVALID` of the fault status (ARMv7-M B3.2.15): [`Crash::bus_address`] is the address whose access failed.
+/// `BFARVALID` of the fault status (ARMv7-M B3.2.15): [`Crash::bus_address`] is the address whose
+/// access failed.
 const BUS_ADDRESS_VALID: u32 = 1 << 15;
 
 /// The reason why the program gave up.
@@ -75,7 +78,8 @@ impl Crash {
 /// Returns the end of `path` that a record has room for.
 fn tail(path: &str) -> String<FILE_BYTES> {
     let from = path.len().saturating_sub(FILE_BYTES);
-    // Within a character of several bytes there is no string; the next one begins at most three bytes later.
+    // Within a character of several bytes there is no string; the next one begins at most three
+    // bytes later.
     let end = (from..path.len()).find_map(|at| path.get(at..)).unwrap_or_default();
     let mut file = String::new();
     // It fits: no more than FILE_BYTES are left.
@@ -129,7 +133,7 @@ mod tests {
         assert_eq!(
             Crash::panic(&std::format!("{wide}x"), 1).file.len(),
             FILE_BYTES - 1,
-            "half a letter is none"
+            "half a letter is left out"
         );
     }
 

@@ -1,5 +1,6 @@
-//! The device's end: commands in, orders for the control law out; ticks in, frames out. The board and the virtual device
-//! share it. It never waits: what the PC does not take in time is dropped, oldest block first, and counted.
+//! The device's end: commands in, orders for the control law out; ticks in, frames out. The board
+//! and the virtual device share it. It never waits: what the PC does not take in time is dropped,
+//! oldest block first, and counted.
 
 mod commands;
 mod upload;
@@ -79,7 +80,8 @@ pub struct Endpoint<W = Waiting> {
 }
 
 impl Endpoint {
-    /// `plan` is the one that the control law starts with; `reset_cause` is reported until a person starts again.
+    /// `plan` is the one that the control law starts with; `reset_cause` is reported until a person
+    /// starts again.
     pub fn new(identity: Identity, plan: &Plan, reset_cause: Option<Fault>) -> Self {
         Self::with(Waiting::new(), identity, plan, reset_cause)
     }
@@ -137,7 +139,8 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
         self.waiting.borrow_mut().orders.pop_front()
     }
 
-    /// The PC is gone: nothing waits for it any longer, and what it asked for and was not yet done is forgotten.
+    /// The PC is gone: nothing waits for it any longer, and what it asked for and was not yet done
+    /// is forgotten.
     pub fn disconnect(&mut self) {
         self.in_session = false;
         self.start_ordered = false;
@@ -163,7 +166,8 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
         self.interlocks = interlocks;
     }
 
-    /// Sets the crash that ended the last run, to be sent after each hello until a person starts the device.
+    /// Sets the crash that ended the last run, to be sent after each hello until a person starts
+    /// the device.
     pub fn set_crash(&mut self, crash: Option<Crash>) {
         self.crash = crash;
     }
@@ -228,7 +232,8 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
         let Some(frame) = self.next_frame() else { return 0 };
         let numbered = Numbered { sequence: self.sequence, frame };
         self.sequence = self.sequence.wrapping_add(1);
-        // No frame is longer than MAX_FRAME (a test holds it); were one, its missing number would be counted as lost.
+        // No frame is longer than MAX_FRAME (a test holds it); were one, its missing number would
+        // be counted as lost.
         codec::encode(&numbered, out).unwrap_or(0)
     }
 
@@ -263,7 +268,8 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
         core::mem::take(&mut self.timing_due).then_some(DeviceFrame::Timing(self.timing))
     }
 
-    /// Returns the answer to a hello: the device's identity and the scale in which it speaks under the configuration in force.
+    /// Returns the answer to a hello: the device's identity and the scale in which it speaks under
+    /// the configuration in force.
     pub fn hello(&self) -> Hello {
         let plan = &self.plan;
         let device = plan.device();

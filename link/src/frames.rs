@@ -1,4 +1,5 @@
-//! The messages of both sides. Additions go to the end of an enum; anything else raises [`PROTOCOL_VERSION`].
+//! The messages of both sides. Additions go to the end of an enum; anything else raises
+//! [`PROTOCOL_VERSION`].
 
 use crate::build::Build;
 use crate::crash::Crash;
@@ -36,7 +37,8 @@ pub struct Numbered {
 /// Device to PC.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum DeviceFrame {
-    /// The device's identity and the scale in which it speaks; the answer to a hello and to a new configuration.
+    /// The device's identity and the scale in which it speaks; the answer to a hello and to a new
+    /// configuration.
     Hello(Hello),
     /// Samples at 10 kHz.
     Samples(SampleBlock),
@@ -50,7 +52,8 @@ pub enum DeviceFrame {
     Ack(Ack),
     /// The device's part of the configuration in force; the answer to [`Command::ReportDevice`].
     Device(Record),
-    /// The crash that ended the device's last run, after the hello of each session until a person starts it.
+    /// The crash that ended the device's last run, after the hello of each session until a person
+    /// starts it.
     Crash(Crash),
 }
 
@@ -150,13 +153,16 @@ pub enum EventKind {
     Stopped,
     /// The configuration is in force, but will be lost at the next reset.
     NotSaved { cause: SaveError },
-    /// The tip has come into the lumen of a vessel, through its near wall or drawn back through its far one: blood shows.
+    /// The tip has come into the lumen of a vessel, through its near wall or drawn back through its
+    /// far one: blood shows.
     Flashback { layer: u8 },
     /// A vessel's far wall has given way: the needle has gone through.
     FarWall { layer: u8 },
-    /// The needle has been turned further from its direction of entry than the tissue around it lets it.
+    /// The needle has been turned further from its direction of entry than the tissue around it
+    /// lets it.
     Barrier,
-    /// The tip has come into a layer that had given way before: it is in the needle's own track, where the layer is open.
+    /// The tip has come into a layer that had given way before: it is in the needle's own track,
+    /// where the layer is open.
     InTrack {
         /// Which layer.
         layer: u8,
@@ -197,7 +203,8 @@ pub struct Timing {
     pub stages: [StageTime; STAGES],
     /// Ticks that came late or not at all.
     pub missed_ticks: u32,
-    /// Codes that were written after the instant at which the converter takes one: they reach the motor a tick later.
+    /// Codes that were written after the instant at which the converter takes one: they reach the
+    /// motor a tick later.
     pub late_codes: u32,
     /// Samples that the device had to drop because the PC did not take them.
     pub dropped_samples: u32,
@@ -301,13 +308,14 @@ pub struct HostFrame {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[expect(clippy::large_enum_variant, reason = "nothing allocates here")]
 pub enum Command {
-    /// Begin a session: the device answers with [`Hello`] and starts to stream. Numbers begin again.
+    /// Begin a session: the device answers with [`Hello`] and starts to stream. Numbers begin
+    /// again.
     Hello {
         /// [`PROTOCOL_VERSION`] of the PC.
         version: u16,
     },
-    /// Whom the needle goes into from now on; taken whole or refused with the reason, and only while torque is off. What
-    /// was found at commissioning stays as it is.
+    /// Whom the needle goes into from now on; taken whole or refused with the reason, and only
+    /// while torque is off. What was found at commissioning stays as it is.
     ConfigurePatient(Patient),
     /// Power up and fade in.
     Start,
@@ -319,33 +327,38 @@ pub enum Command {
     Heartbeat,
     /// Play an excitation, with no hand on the needle; only while torque is off.
     Excite(Excitation),
-    /// The device's part of the configuration; taken whole or refused with the reason, and only while torque is off. One that
-    /// calls itself commissioned is taken by a device that is, where it exchanges nothing that commissioning found and raises
-    /// no ceiling. A patient whom it does not suit leaves: until another is sent there is nobody, and no force.
+    /// The device's part of the configuration; taken whole or refused with the reason, and only
+    /// while torque is off. One that calls itself commissioned is taken by a device that is, where
+    /// it exchanges nothing that commissioning found and raises no ceiling. A patient whom it does
+    /// not suit leaves: until another is sent there is nobody, and no force.
     ConfigureDevice(Device),
     /// Tell the device's part of the configuration.
     ReportDevice,
-    /// The gains of the compensation from now on, torque on or off, until the device is configured or restarted; taken whole or
-    /// refused with the reason.
+    /// The gains of the compensation from now on, torque on or off, until the device is configured
+    /// or restarted; taken whole or refused with the reason.
     Compensate(Gains),
-    /// The rotor's angle is zero at this many counts past the zero, until the device is restarted; `None`: it is not known.
-    /// Only while torque is off.
+    /// The rotor's angle is zero at this many counts past the zero, until the device is restarted;
+    /// `None`: it is not known. Only while torque is off.
     Index(Option<i32>),
-    /// [`Command::ConfigureDevice`] with what this device has told of itself before: taken as it is where the seal is its own.
+    /// [`Command::ConfigureDevice`] with what this device has told of itself before: taken as it is
+    /// where the seal is its own.
     RestoreDevice(Record),
-    /// Marks the device's configuration as found by commissioning: accepted if its own pulses have shown that the motor
-    /// and the encoder go together, and only while torque is off. Nothing else commissions a device.
+    /// Marks the device's configuration as found by commissioning: accepted if its own pulses have
+    /// shown that the motor and the encoder go together, and only while torque is off. Nothing else
+    /// commissions a device.
     Commission,
-    /// A segment of a sequence, kept by the device and not played; only while torque is off. The first begins another sequence, and each
-    /// must follow the one before it. One that is refused takes those before it along.
+    /// A segment of a sequence, kept by the device and not played; only while torque is off. The
+    /// first begins another sequence, and each must follow the one before it. One that is refused
+    /// takes those before it along.
     Segment {
         /// Its place, from 0.
         index: u8,
         /// Its excitation.
         excitation: Excitation,
     },
-    /// Play the sequence that was uploaded, without a rest between its segments and with no hand on the needle; only while torque is off, and
-    /// only if it is whole. It is forgotten then, as it is at a stop, a fault, a new configuration and the end of the session.
+    /// Play the sequence that was uploaded, without a rest between its segments and with no hand on
+    /// the needle; only while torque is off, and only if it is whole. It is forgotten then, as it
+    /// is at a stop, a fault, a new configuration and the end of the session.
     Play {
         /// The number of its segments.
         count: u8,

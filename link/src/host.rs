@@ -34,7 +34,8 @@ impl Reception {
         self.counted(read)
     }
 
-    /// Takes bytes from the front of `bytes` until a frame is whole, and returns it; `None` where they end before that.
+    /// Takes bytes from the front of `bytes` until a frame is whole, and returns it; `None` where
+    /// they end before that.
     pub fn take(&mut self, bytes: &mut &[u8]) -> Option<DeviceFrame> {
         while let Some(read) = self.decoder.take(bytes) {
             let frame = self.counted(read);
@@ -67,7 +68,8 @@ impl Reception {
         self.counts.frames += 1;
         let restarted = matches!(numbered.frame, DeviceFrame::Hello(_)) && numbered.sequence == 0;
         if !restarted && let Some(expected) = self.next_sequence {
-            // A number from before the expected one is a device that started anew, not four thousand million lost frames.
+            // A number from before the expected one is a device that started anew, not four
+            // thousand million lost frames.
             let gap = numbered.sequence.wrapping_sub(expected);
             if gap < u32::MAX / 2 {
                 self.counts.lost_frames += u64::from(gap);
@@ -95,7 +97,8 @@ pub struct Commands {
 }
 
 impl Commands {
-    /// Writes `command` to `out` under a new id; the id and the number of bytes. To repeat it, send the same bytes.
+    /// Writes `command` to `out` under a new id; the id and the number of bytes. To repeat it, send
+    /// the same bytes.
     pub fn encode(&mut self, command: Command, out: &mut [u8; MAX_FRAME]) -> Result<(u32, usize), TooLong> {
         self.last_id = self.last_id.wrapping_add(1);
         let frame = HostFrame { id: self.last_id, command };

@@ -9,8 +9,9 @@ use serde::{Deserialize, Serialize};
 pub struct Record {
     /// The device's part.
     pub device: Device,
-    /// CRC-32 of the device's part and the number of the device. It tells a file of another device, and one that was edited,
-    /// from this one's. It is no secret: a program that forges it gets past this, and not past the board's ceilings.
+    /// CRC-32 of the device's part and the number of the device. It tells a file of another device,
+    /// and one that was edited, from this one's. It is no secret: a program that forges it gets
+    /// past this, and not past the board's ceilings.
     pub seal: u32,
 }
 

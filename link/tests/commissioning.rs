@@ -1,4 +1,5 @@
-//! Nothing that a PC sends commissions a device or raises what it was commissioned with: its own pulses do, or its own seal.
+//! Nothing that a PC sends commissions a device or raises what it was commissioned with: its own
+//! pulses do, or its own seal.
 
 use control_core::ceilings::Ceilings;
 use control_core::excitation::{Excitation, GENTLE_TORQUE, Servo, Signal};

@@ -281,7 +281,8 @@ fn a_needle_that_goes_in_and_out_is_told_layer_by_layer() {
 fn limit_changes_are_reported_except_the_slew_limit() {
     let mut device = Device::in_session();
     device.controller.order(Order::Start);
-    // A puncture at 157 mm/s changes force faster than torque may change; 0.3 s later torque has faded in.
+    // A puncture at 157 mm/s changes force faster than torque may change; 0.3 s later torque has
+    // faded in.
     let mut seen = events(&mut device, &[-3_000, 700, -50]);
     seen.retain(|kind| matches!(kind, EventKind::Started | EventKind::Limits { .. }));
     let limits = |in_force| EventKind::Limits { in_force };

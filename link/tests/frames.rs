@@ -1,4 +1,5 @@
-//! Frames survive the journey; garbage, truncation and floods cost no more than they must and are counted.
+//! Frames survive the journey; garbage, truncation and floods cost no more than they must and are
+//! counted.
 
 use control_core::config::{Config, MAX_LAYERS};
 use control_core::controller::Sample;

@@ -1,4 +1,5 @@
-//! A sequence on its way: uploaded segment by segment, played as a whole or refused as a whole, and forgotten with its session.
+//! A sequence on its way: uploaded segment by segment, played as a whole or refused as a whole, and
+//! forgotten with its session.
 
 use control_core::config::Config;
 use control_core::event::Fault;

@@ -29,7 +29,8 @@ pub struct SurfaceView {
     pub kind: Kind,
     /// Number of its layer in the scene.
     pub layer: usize,
-    /// In a body, its tissue by the number that the page calls it by: those of the input, 9 an artery.
+    /// In a body, its tissue by the number that the page calls it by: those of the input, 9 an
+    /// artery.
     pub tissue: u32,
     /// Three particles each.
     pub triangles: Vec<[u32; 3]>,

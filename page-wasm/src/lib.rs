@@ -1,11 +1,13 @@
-//! The page's own computing in the browser: tissue and ultrasound, behind functions of plain numbers.
+//! The page's own computing in the browser: tissue and ultrasound, behind functions of plain
+//! numbers.
 //!
-//! The page writes numbers to [`input`], calls [`build`], then [`step`] for each picture and [`image`] for each ultrasound
-//! image; what it draws it reads from the memory that the pointers show, anew after every call that may allocate.
-//! `host-sim/page/picture.js` is the other side. Everything that thinks is in [`picture`].
+//! The page writes numbers to [`input`], calls [`build`], then [`step`] for each picture and
+//! [`image`] for each ultrasound image; what it draws it reads from the memory that the pointers
+//! show, anew after every call that may allocate. `host-sim/page/picture.js` is the other side.
+//! Everything that thinks is in [`picture`].
 //!
-//! The names are exported as they stand, which the language counts as unsafe, and in the browser only; there is no other unsafe code. The
-//! program itself takes [`picture`] for its streams.
+//! The names are exported as they stand, which the language counts as unsafe, and in the browser
+//! only; there is no other unsafe code. The program itself takes [`picture`] for its streams.
 
 pub mod drawn;
 mod limb;
@@ -48,8 +50,8 @@ pub extern "C" fn input() -> usize {
     INPUT_NUMBERS.with_borrow(|numbers| address(numbers))
 }
 
-/// Builds the tissue from the first `count` numbers of [`input`], as [`Picture::new`] reads them: 1, or 0 where they are not
-/// usable.
+/// Builds the tissue from the first `count` numbers of [`input`], as [`Picture::new`] reads them:
+/// 1, or 0 where they are not usable.
 #[cfg_attr(target_arch = "wasm32", unsafe(no_mangle))]
 pub extern "C" fn build(count: u32) -> u32 {
     let numbers =
@@ -60,7 +62,8 @@ pub extern "C" fn build(count: u32) -> u32 {
     u32::from(is_built)
 }
 
-/// The device says that the wall of a layer (by its number in the scene) gave way (1), or that the needle has left it (0).
+/// The device says that the wall of a layer (by its number in the scene) gave way (1), or that the
+/// needle has left it (0).
 #[cfg_attr(target_arch = "wasm32", unsafe(no_mangle))]
 pub extern "C" fn tell(layer: u32, given: u32) {
     let state = if given == 0 { PunctureState::Away } else { PunctureState::Inserted };
@@ -103,8 +106,8 @@ pub extern "C" fn surfaces() -> u32 {
     with(|picture| picture.surfaces().len() as u32)
 }
 
-/// Returns the kind of a surface: 0 skin behind the needle's plane, 1 skin before it, 2 section, 3 vessel behind, 4 vessel
-/// before, 5 and 6 a part inside the body behind and before.
+/// Returns the kind of a surface: 0 skin behind the needle's plane, 1 skin before it, 2 section, 3
+/// vessel behind, 4 vessel before, 5 and 6 a part inside the body behind and before.
 #[cfg_attr(target_arch = "wasm32", unsafe(no_mangle))]
 pub extern "C" fn surface_kind(number: u32) -> u32 {
     surface(number, |surface| surface.kind as u32)
@@ -134,7 +137,8 @@ pub extern "C" fn surface_triangle_count(number: u32) -> u32 {
     surface(number, |surface| surface.triangles.len() as u32)
 }
 
-/// Returns the address of the vessel's section by the needle's plane: [`picture::SLICES`] pairs of numbers, upper and lower wall in mm.
+/// Returns the address of the vessel's section by the needle's plane: [`picture::SLICES`] pairs of
+/// numbers, upper and lower wall in mm.
 #[cfg_attr(target_arch = "wasm32", unsafe(no_mangle))]
 pub extern "C" fn lumen() -> usize {
     with(|picture| address(picture.lumen()))
@@ -158,8 +162,9 @@ pub extern "C" fn upright(along_mm: f32, across_mm: f32, azimuth: f32) -> f32 {
     with(|picture| picture.on_skin([along_mm, across_mm], azimuth)[1])
 }
 
-/// Looks from the first three numbers of [`input`] in the direction of the next three: the address of the place of the skin there, mm, and
-/// how far along (mm) and around (degrees) the limb that is; 0 where there is no skin.
+/// Looks from the first three numbers of [`input`] in the direction of the next three: the address
+/// of the place of the skin there, mm, and how far along (mm) and around (degrees) the limb that
+/// is; 0 where there is no skin.
 #[cfg_attr(target_arch = "wasm32", unsafe(no_mangle))]
 pub extern "C" fn pick() -> usize {
     let line = INPUT_NUMBERS.with_borrow(|n| [[n[0], n[1], n[2]], [n[3], n[4], n[5]]]);
@@ -176,14 +181,16 @@ pub extern "C" fn image_depth() -> f32 {
     with(|picture| picture.image_depth_mm())
 }
 
-/// Makes an ultrasound image, the last one being `seconds` ago: brightness, 256 lines of 1,024 samples.
+/// Makes an ultrasound image, the last one being `seconds` ago: brightness, 256 lines of 1,024
+/// samples.
 #[cfg_attr(target_arch = "wasm32", unsafe(no_mangle))]
 pub extern "C" fn image(seconds: f32, gain_db: f32) -> usize {
     with(|picture| address(picture.image(seconds, gain_db)))
 }
 
-/// 0: share of the needle in the image's plane; 1: whether its tip is seen; 2: how far the tip lies beside the plane, mm;
-/// 3: share of the time in the body that the tip was seen; 4: mean share of the needle that was seen; 5: time in the body, s.
+/// 0: share of the needle in the image's plane; 1: whether its tip is seen; 2: how far the tip lies
+/// beside the plane, mm; 3: share of the time in the body that the tip was seen; 4: mean share of
+/// the needle that was seen; 5: time in the body, s.
 #[cfg_attr(target_arch = "wasm32", unsafe(no_mangle))]
 pub extern "C" fn seen(what: u32) -> f32 {
     with(|picture| picture.seen(what))

@@ -1,5 +1,6 @@
-//! A body of three dimensions as the picture shows it: the layers about the point of entry as curved tissue that gives way, everything else as
-//! surfaces that stay, all cut along the needle's plane.
+//! A body of three dimensions as the picture shows it: the layers about the point of entry as
+//! curved tissue that gives way, everything else as surfaces that stay, all cut along the needle's
+//! plane.
 
 use crate::drawn::{Given, Kind, SurfaceView};
 use anatomy::{Block, Body, Line, Place, Role, Site, Structure, Tissue};
@@ -12,14 +13,15 @@ pub(crate) const NUMBERS: usize = 7;
 const GRID: [usize; 2] = [28, 17];
 /// The block of tissue reaches so deep under the skin, mm.
 pub(crate) const BLOCK_MM: f64 = 30.0;
-/// A tube deeper than this is none of the block's, mm.
+/// A tube deeper than this is outside the block, mm.
 const DEEPEST_MM: f32 = 40.0;
 /// A layer is drawn at least so thick, mm.
 const THINNEST_MM: f64 = 0.35;
 /// Starts above everything, mm.
 const ABOVE_MM: f64 = 300.0;
 
-/// The numbers of tissues that the page has colours for; the first seven are those of `drawn::TISSUES`.
+/// The numbers of tissues that the page has colours for; the first seven are those of
+/// `drawn::TISSUES`.
 pub(crate) fn code(tissue: Tissue) -> u32 {
     match tissue {
         Tissue::Skin => 0,
@@ -60,7 +62,8 @@ impl Limb {
         self.body.structures.iter().filter(|structure| structure.role == Role::Layer)
     }
 
-    /// The depth at which a structure begins straight under a place of the block, mm; none where it does not.
+    /// The depth at which a structure begins straight under a place of the block, mm; none where it
+    /// does not.
     pub(crate) fn top(&self, structure: &Structure, x: f64, y: f64) -> Option<f64> {
         let down = self.block().axes[2];
         let from = self.block().to_limb([x, y, -ABOVE_MM]);
@@ -68,7 +71,8 @@ impl Limb {
         Some(first - ABOVE_MM)
     }
 
-    /// The skin straight under a place of the block, mm; where there is none, as deep as at its edge towards the entry.
+    /// The skin straight under a place of the block, mm; where there is none, as deep as at its
+    /// edge towards the entry.
     pub(crate) fn skin(&self, x: f64, y: f64) -> f64 {
         let Some(skin) = self.body.structures.first() else { return 0.0 };
         let inwards = (0..=20).map(|step| 1.0 - f64::from(step) * 0.05);
@@ -103,7 +107,8 @@ impl Limb {
         Relief { columns: GRID[0], lines: GRID[1], faces_mm: faces }
     }
 
-    /// Tissue about the point of entry, the layer of the scene that each wall is, and the tube that is part of it.
+    /// Tissue about the point of entry, the layer of the scene that each wall is, and the tube that
+    /// is part of it.
     pub(crate) fn configure(
         &self,
         given: &[Given],
@@ -144,7 +149,8 @@ impl Limb {
         (configuration, walls, tube)
     }
 
-    /// The tube that the needle's line comes nearest to within the block, as a vessel that gives way, with its structure and its number there.
+    /// The tube that the needle's line comes nearest to within the block, as a vessel that gives
+    /// way, with its structure and its number there.
     fn vessel(&self, given: &[Given], along: [f32; 2], half_width: f32) -> Option<(Vessel, [usize; 2])> {
         let travel = |wanted: fn(&Given) -> bool| {
             given.iter().find(|layer| wanted(layer)).map_or(0.0, |layer| layer.travel_mm.clamp(0.0, 30.0))
@@ -206,7 +212,8 @@ impl Limb {
         }
     }
 
-    /// Returns the place where a line of sight in the block's frame first meets the skin, and how far along (mm) and around (degrees) the limb that is.
+    /// Returns the place where a line of sight in the block's frame first meets the skin, and how
+    /// far along (mm) and around (degrees) the limb that is.
     pub(crate) fn pick(&self, [eye, direction]: [[f64; 3]; 2]) -> Option<([f64; 3], [f64; 2])> {
         let size = direction.iter().map(|v| v * v).sum::<f64>().sqrt();
         let (from, ahead) =
@@ -220,7 +227,8 @@ impl Limb {
     }
 }
 
-/// Returns the place where a line of sight first meets a limb without a body: a cylinder that touches the entry from below.
+/// Returns the place where a line of sight first meets a limb without a body: a cylinder that
+/// touches the entry from below.
 pub(crate) fn pick_cylinder(radius: f64, [eye, direction]: [[f64; 3]; 2]) -> Option<[f64; 3]> {
     let limb = anatomy::solid::Convex::Cylinder { across: radius, down: radius };
     let size = direction.iter().map(|v| v * v).sum::<f64>().sqrt();

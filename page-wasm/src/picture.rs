@@ -62,7 +62,8 @@ fn given(numbers: &[f32]) -> Vec<Given> {
     layers.collect()
 }
 
-/// The surfaces to draw, of the tissue and of what stays beside it; and what stays, its points after the tissue's.
+/// The surfaces to draw, of the tissue and of what stays beside it; and what stays, its points
+/// after the tissue's.
 fn surfaces(
     tissue: &Tissue,
     walls: &[Option<WallName>],
@@ -80,11 +81,12 @@ fn surfaces(
 }
 
 impl Picture {
-    /// From numbers: how many layers there are; for each its tissue (`TISSUES`, 7 the vessel, 8 its far wall), its depth
-    /// below the skin in mm, how far its wall is pushed in along the needle before it gives way in mm (negative: no wall) and
-    /// friction in N/mm; then the vessel's width and how far its axis lies beside the needle's plane, in mm; then the angle to
-    /// the skin in rad and the needle's diameter in mm; then 1 for Table 1 of Paper 000 instead of the limb, or 2 for a body, with its
-    /// numbers as `Limb::new` reads them.
+    /// From numbers: how many layers there are; for each its tissue (`TISSUES`, 7 the vessel, 8 its
+    /// far wall), its depth below the skin in mm, how far its wall is pushed in along the needle
+    /// before it gives way in mm (negative: no wall) and friction in N/mm; then the vessel's width
+    /// and how far its axis lies beside the needle's plane, in mm; then the angle to the skin in
+    /// rad and the needle's diameter in mm; then 1 for Table 1 of Paper 000 instead of the limb, or
+    /// 2 for a body, with its numbers as `Limb::new` reads them.
     pub fn new(numbers: &[f32]) -> Result<Self, String> {
         let count = numbers.first().copied().filter(|n| (1.0..=8.0).contains(n)).ok_or("no layers")? as usize;
         let rest = numbers.get(1 + PER_LAYER * count..).unwrap_or_default();
@@ -149,7 +151,8 @@ impl Picture {
         self.probe.depth_mm
     }
 
-    /// The device says that the wall of a layer of the scene gave way, or that the needle has left it.
+    /// The device says that the wall of a layer of the scene gave way, or that the needle has left
+    /// it.
     pub fn tell(&mut self, layer: usize, state: PunctureState) {
         if let Some(Some(wall)) = self.walls.get(layer) {
             self.tissue.tell(*wall, state);
@@ -168,7 +171,8 @@ impl Picture {
         self.shaft = Shaft { tip_mm: needle.tip, direction: needle.direction, inserted_mm, ..self.shaft };
     }
 
-    /// Returns the state of the wall of a layer of the scene: away from the needle, touched or pierced.
+    /// Returns the state of the wall of a layer of the scene: away from the needle, touched or
+    /// pierced.
     pub fn wall_state(&self, layer: usize) -> PunctureState {
         let Some(Some(wall)) = self.walls.get(layer) else { return PunctureState::Away };
         let state = self.tissue.states().find(|(name, ..)| name == wall);
@@ -192,8 +196,8 @@ impl Picture {
         &self.surfaces
     }
 
-    /// Upper and lower wall of the vessel in the needle's plane, mm, at [`SLICES`] places along the block; equal where there is
-    /// none.
+    /// Upper and lower wall of the vessel in the needle's plane, mm, at [`SLICES`] places along the
+    /// block; equal where there is none.
     pub fn lumen(&self) -> &[[f32; 2]] {
         &self.lumen
     }
@@ -210,8 +214,8 @@ impl Picture {
         &self.probe
     }
 
-    /// Returns the depth of the skin at a place along and across, mm, and, on a body, the lean that makes a probe of this turn stand
-    /// upright on it, rad.
+    /// Returns the depth of the skin at a place along and across, mm, and, on a body, the lean that
+    /// makes a probe of this turn stand upright on it, rad.
     pub fn on_skin(&self, [along_mm, across_mm]: [f32; 2], azimuth: f32) -> [f32; 2] {
         let Some(limb) = &self.limb else {
             let radius = self.limb_radius_mm;
@@ -225,7 +229,8 @@ impl Picture {
         [skin(0.0), -(0.5 * (skin(1.0) - skin(-1.0))).atan()]
     }
 
-    /// Returns where a line of sight meets the skin: the place in mm and, on a body, how far along (mm) and around (degrees) the limb that is.
+    /// Returns where a line of sight meets the skin: the place in mm and, on a body, how far along
+    /// (mm) and around (degrees) the limb that is.
     pub fn pick(&self, eye: [f32; 3], direction: [f32; 3]) -> Option<[f32; 5]> {
         let line = [eye, direction].map(|v| v.map(f64::from));
         let (place, [along, around]) = match &self.limb {

@@ -20,7 +20,8 @@ pub(crate) fn bottom_mm(given: &[Given]) -> f32 {
     if bottom.is_finite() { bottom.clamp(14.0, DEEPEST_MM) } else { 16.0 }
 }
 
-/// Layers and vessel for the tissue picture, and which of its walls belongs to which layer of the scene.
+/// Layers and vessel for the tissue picture, and which of its walls belongs to which layer of the
+/// scene.
 pub(crate) fn configure(
     given: &[Given],
     [width, offset]: [f32; 2],

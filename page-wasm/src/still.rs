@@ -1,4 +1,5 @@
-//! The parts of a body that stay as they are in the picture: the skin around the block of tissue, the section beyond it, bones, bursae and tubes.
+//! The parts of a body that stay as they are in the picture: the skin around the block of tissue,
+//! the section beyond it, bones, bursae and tubes.
 
 use crate::drawn::{Kind, SurfaceView};
 use crate::limb::{BLOCK_MM, Limb, code};
@@ -11,7 +12,8 @@ const LIMB_ACROSS_MM: f64 = 60.0;
 const LIMB_STEP_MM: f64 = 5.0;
 /// Skin deeper than this below the point of entry is not drawn, mm.
 const LOWEST_MM: f64 = 60.0;
-/// A section is painted over that of the structure before it by so much, mm towards the eye: all of them are thinner than a needle.
+/// A section is painted over that of the structure before it by so much, mm towards the eye: all of
+/// them are thinner than a needle.
 const OVER_MM: f64 = 0.04;
 /// The section beyond the block of tissue reaches so far into it, mm.
 const EDGE_MM: f64 = 1.4;
@@ -50,7 +52,8 @@ pub(crate) struct Still {
 }
 
 impl Limb {
-    /// Everything that stays: the skin of the limb around the block, the section beyond it, and what is inside, without the tube that gives way.
+    /// Everything that stays: the skin of the limb around the block, the section beyond it, and
+    /// what is inside, without the tube that gives way.
     pub(crate) fn still(&self, along: [f32; 2], half_width: f32, moving: Option<[usize; 2]>) -> Still {
         let mut still = Still::default();
         self.skin_around(along.map(f64::from), f64::from(half_width), &mut still);
@@ -140,7 +143,8 @@ impl Limb {
             let count = outline.points_mm.len();
             // A little over its edges, which do not move.
             let in_block = |x: f64| x > along[0] + EDGE_MM && x < along[1] - EDGE_MM;
-            // The block of tissue shows its own; under it the layer goes on, from a second line of points.
+            // The block of tissue shows its own; under it the layer goes on, from a second line of
+            // points.
             let tops = outline.points_mm.iter().take(count / 2);
             let under =
                 tops.map(|[x, z]| [*x, if is_layer { z.max(self.skin(*x, 0.0) + BLOCK_MM) } else { *z }]);

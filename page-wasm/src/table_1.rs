@@ -1,11 +1,12 @@
-//! Table 1 of Paper 000 in place of the limb: skin, vessel and skin as three slabs, with the paper's spacing, volume and bending.
+//! Table 1 of Paper 000 in place of the limb: skin, vessel and skin as three slabs, with the
+//! paper's spacing, volume and bending.
 
 use crate::drawn::Given;
 use tissue::Configuration;
 use tissue::needle::WallName;
 
-/// Returns the tissue of Table 1 with the depths of the scene's vessel, and which of its walls belongs to which layer of the scene; an
-/// error if the scene has no vessel between two walls.
+/// Returns the tissue of Table 1 with the depths of the scene's vessel, and which of its walls
+/// belongs to which layer of the scene; an error if the scene has no vessel between two walls.
 pub(crate) fn configure(
     given: &[Given],
     bottom_mm: f32,
@@ -32,7 +33,8 @@ mod tests {
     use crate::picture::Picture;
     use tissue::PunctureState;
 
-    /// Skin, vessel at 4 mm, bottom skin at 7 mm, entered at 60°; the last number chooses the tissue.
+    /// Skin, vessel at 4 mm, bottom skin at 7 mm, entered at 60°; the last number chooses the
+    /// tissue.
     fn phantom(table_1: f32) -> Vec<f32> {
         let mut numbers = vec![3.0, 0.0, 0.0, 2.8, 0.0, 7.0, 4.0, 0.9, 0.0, 8.0, 7.0, 1.2, 0.0];
         numbers.extend([3.0, 0.0, 1.05, 0.82, table_1]);

@@ -1,4 +1,5 @@
-//! One run of the benchmark: build a case, show its files to the tool, ask the baselines, keep the record, forget the rest.
+//! One run of the benchmark: build a case, show its files to the tool, ask the baselines, keep the
+//! record, forget the rest.
 
 use std::path::Path;
 use std::time::Instant;
@@ -16,7 +17,8 @@ use crate::report_residuals;
 use crate::scratch::Scratch;
 use crate::tool::{Tool, ask};
 
-/// Runs every case that the time allows; records in the order of `specs`, and how many cases no machine drawn could show.
+/// Runs every case that the time allows; records in the order of `specs`, and how many cases no
+/// machine drawn could show.
 pub(crate) fn run_cases(
     options: &Options,
     specs: &[Spec],
@@ -68,10 +70,12 @@ fn run_case(
     Ok(Some(record))
 }
 
-/// Hidden physics of the recordings that the time is measured on: a plain one and the two joints, whose laws take the longest.
+/// Hidden physics of the recordings that the time is measured on: a plain one and the two joints,
+/// whose laws take the longest.
 const TIMED: [&str; 3] = ["cogging", "backlash", "roller_slip"];
 
-/// Seconds that the tool takes for 60 s at 10 kHz (three recordings of 20 s) of each of [`TIMED`], with the machine to itself.
+/// Seconds that the tool takes for 60 s at 10 kHz (three recordings of 20 s) of each of [`TIMED`],
+/// with the machine to itself.
 pub(crate) fn measure_speed(seed: u64, tool: &dyn Tool) -> Result<Vec<Timed>, String> {
     let scratch = Scratch::new()?;
     TIMED.iter().map(|hidden| timed(seed, tool, hidden, &scratch.0.join(hidden))).collect()

@@ -1,6 +1,8 @@
-//! Weights of the tool's confidence from runs whose keys are open: a logistic regression of right and wrong on evidence.
+//! Weights of the tool's confidence from runs whose keys are open: a logistic regression of right
+//! and wrong on evidence.
 //!
-//! Every category counts as it would in a full run, whatever was run. Seeds that calibrate may not judge.
+//! Every category counts as it would in a full run, whatever was run. Seeds that calibrate may not
+//! judge.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;

@@ -1,5 +1,5 @@
-//! The list of cases of one run: every effect at three strengths, pairs, nulls, wrong values, physics without a name, and
-//! recordings that cannot tell.
+//! The list of cases of one run: every effect at three strengths, pairs, nulls, wrong values,
+//! physics without a name, and recordings that cannot tell.
 
 use crate::generator::effects::{EFFECTS, go_together};
 use crate::generator::excite::Kind;

@@ -1,5 +1,6 @@
-//! Real machines: nobody knows what is in them, so an answer is judged against what their sources say and least squares
-//! found. One line a case in `believed.tsv`; the rules stand in `docs/benchmark.md`.
+//! Real machines: nobody knows what is in them, so an answer is judged against what their sources
+//! say and least squares found. One line a case in `believed.tsv`; the rules stand in
+//! `docs/benchmark.md`.
 
 use crate::judge::Record;
 

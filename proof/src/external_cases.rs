@@ -67,7 +67,7 @@ fn run_case(case: &Brought, options: &Options, tool: &dyn Tool, scratch: &Path) 
         Some(reports) => reports.join(&case.id),
         None => dir.join("out"),
     };
-    // The tool sees the files in a folder of their own, so that no key lies beside them.
+    // The tool sees the files in a folder of their own, so that no key is next to them.
     let paths = case.paths.copied(&dir)?;
     let start = Instant::now();
     let answer = ask(tool, &paths, &out);

@@ -1,4 +1,4 @@
-//! Folders of cases that somebody else made: what lies where (`docs/benchmark.md`).
+//! Folders of cases that somebody else made, with their layout (`docs/benchmark.md`).
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -19,7 +19,8 @@ pub(crate) struct Record {
     pub(crate) id: String,
     pub(crate) key: Key,
     pub(crate) answer: Result<Answer, String>,
-    /// The residual on the held-out recording by the judge's own inverse dynamics, or why it could not be computed.
+    /// The residual on the held-out recording by the judge's own inverse dynamics, or why it could
+    /// not be computed.
     pub(crate) left: Result<Left, String>,
     /// The same by the report's own residuals.
     pub(crate) reported: Option<Left>,
@@ -48,7 +49,8 @@ impl Record {
         self.key.effects.iter().any(|hidden| named.holds(hidden))
     }
 
-    /// Returns the hypotheses that came through the tool's search with their evidence, and whether each was right.
+    /// Returns the hypotheses that came through the tool's search with their evidence, and whether
+    /// each was right.
     pub(crate) fn weighed(&self) -> impl Iterator<Item = (&Weighed, bool)> {
         let all = self.answer.as_ref().map_or(&[][..], |a| &a.weighed);
         all.iter().map(|w| {
@@ -71,13 +73,15 @@ impl Record {
         self.effects().iter().all(|e| self.is_true(e))
     }
 
-    /// Returns how many of the hidden effects are found, by name or class; never more than there are names.
+    /// Returns how many of the hidden effects are found, by name or class; never more than there
+    /// are names.
     pub(crate) fn found(&self) -> usize {
         let found = self.key.effects.iter().filter(|h| self.effects().iter().any(|e| e.holds(h))).count();
         found.min(self.effects().len())
     }
 
-    /// Names nothing, and says that something is there which it does not know, or which does not repeat.
+    /// Names nothing, and says that something is there which it does not know, or which does not
+    /// repeat.
     pub(crate) fn abstains(&self) -> bool {
         let invisible = self.key.snr.is_some_and(|snr| snr < INVISIBLE);
         let weak = invisible || self.key.random && self.key.strength <= WEAK;
@@ -129,8 +133,9 @@ impl Record {
         }
     }
 
-    /// The held-out improvement as a share of an oracle's, in mean squares, by the judge's own inverse dynamics and on the
-    /// rows that it judges; `None` where there is nothing to improve or the judge cannot run the patched rig.
+    /// The held-out improvement as a share of an oracle's, in mean squares, by the judge's own
+    /// inverse dynamics and on the rows that it judges; `None` where there is nothing to improve or
+    /// the judge cannot run the patched rig.
     pub(crate) fn gain(&self) -> Option<f64> {
         if !matches!(self.key.category, Category::Single | Category::Pair | Category::Triple) {
             return None;
@@ -179,8 +184,9 @@ impl Record {
         (room >= EXPLAINABLE * oracle.floor.powi(2) && room > 0.0).then_some((oracle.floor, room))
     }
 
-    /// Returns whether each 95 % interval of a parameter contains its known true value. If the unit contains force, that value is
-    /// scaled by the tool's own gain, because motor data do not determine the gain.
+    /// Returns whether each 95 % interval of a parameter contains its known true value. If the unit
+    /// contains force, that value is scaled by the tool's own gain, because motor data do not
+    /// determine the gain.
     pub(crate) fn coverage(&self) -> Vec<(String, bool)> {
         let Ok(answer) = &self.answer else { return Vec::new() };
         let gain = answer.gain.unwrap_or(self.nominal_gain);
@@ -206,7 +212,7 @@ impl Record {
 pub(crate) struct Gain {
     /// Over what the oracle gains, whatever noise the tool's own estimator adds.
     pub(crate) of_oracle: f64,
-    /// Over what the tool's own refit leaves above the noise: what is left counts against it.
+    /// Over what the tool's own refit leaves above the noise: the residual counts against it.
     pub(crate) of_own: f64,
 }
 

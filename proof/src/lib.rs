@@ -1,8 +1,10 @@
 //! The blinded benchmark of the diagnosis.
 //!
-//! A generator with a plant of its own writes recordings; the tool sees these and the rig file and nothing else; a judge
-//! opens the key. Of the tool this crate may use the one entry point and the files it writes, never its models.
+//! A generator with a plant of its own writes recordings; the tool sees these and the rig file and
+//! nothing else; a judge opens the key. Of the tool this crate may use the one entry point and the
+//! files it writes, never its models.
 
+mod answers;
 mod baselines;
 mod bench;
 mod calibrate;
@@ -67,6 +69,10 @@ pub fn run(options: &Options) -> Result<(), String> {
         return options.cases_from.iter().try_for_each(|top| judge_folder(options, top, &*tool));
     }
     let specs = wanted(options);
+    if let Some(before) = &options.same_as {
+        let before = tool::Program { line: before.clone(), patience: PATIENCE };
+        return answers::run(options, &specs, options.cases.unwrap_or(answers::CASES), [&before, &*tool]);
+    }
     if let Some(dir) = &options.write {
         return write_all(options, &specs, dir);
     }
@@ -179,7 +185,12 @@ fn gate(metrics: &metrics::Metrics) -> Result<(), String> {
 }
 
 fn wanted(options: &Options) -> Vec<Spec> {
-    let amounts = if options.quick { Amounts::quick() } else { Amounts::full(options.draws()) };
+    let amounts = match options.same_as {
+        // With `--cases`, the number of recordings.
+        Some(_) => Amounts::full(options.cases.unwrap_or(answers::CASES).div_ceil(answers::CASES)),
+        None if options.quick => Amounts::quick(),
+        None => Amounts::full(options.draws()),
+    };
     let mut specs = cases::list(amounts, options.seed);
     if let Some(text) = &options.only {
         specs.retain(|s| s.category.matches(text) || s.hidden.iter().any(|h| h.contains(text.as_str())));

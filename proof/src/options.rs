@@ -10,7 +10,8 @@ const INPUTS: [&str; 4] = ["designed", "multisines", "characterise", "passive"];
 pub struct Options {
     /// Seed of every draw: the same seed gives the same cases to the last byte.
     pub seed: u64,
-    /// Draws of every effect at every strength, with pairs, nulls and the rest in proportion; or effects to conceal in all.
+    /// Draws of every effect at every strength, with pairs, nulls and the rest in proportion; or
+    /// effects to conceal in all.
     pub cases: Option<usize>,
     /// The small fixed run.
     pub quick: bool,
@@ -18,7 +19,8 @@ pub struct Options {
     pub settle: bool,
     /// With `settle`: the folder of plants that are settled instead of drawn ones.
     pub plants_from: Option<PathBuf>,
-    /// With `settle`: the sources of inputs that are compared, the one that sets the time of motion first.
+    /// With `settle`: the sources of inputs that are compared, the one that sets the time of motion
+    /// first.
     pub inputs: Vec<&'static str>,
     /// Cases that run at the same time.
     pub jobs: usize,
@@ -28,7 +30,8 @@ pub struct Options {
     pub write: Option<PathBuf>,
     /// Only cases whose category or hidden physics contains this text.
     pub only: Option<String>,
-    /// Results of earlier runs: find the weights of the tool's confidence from them, and run nothing.
+    /// Results of earlier runs: find the weights of the tool's confidence from them, and run
+    /// nothing.
     pub calibrate: Vec<PathBuf>,
     /// Folders of cases that somebody else made: judge these and draw none.
     pub cases_from: Vec<PathBuf>,
@@ -42,6 +45,9 @@ pub struct Options {
     pub reports: Option<PathBuf>,
     /// Another tool, by its command line.
     pub tool: Option<String>,
+    /// An earlier program, by its command line: compare its answers with those of `tool`, and judge
+    /// none.
+    pub same_as: Option<String>,
     /// Folder for `proof.json` and `proof.md`.
     pub out: PathBuf,
 }
@@ -66,6 +72,7 @@ impl Default for Options {
             keep: None,
             reports: None,
             tool: None,
+            same_as: None,
             out: PathBuf::from("target"),
         }
     }
@@ -75,7 +82,7 @@ impl Default for Options {
 pub(crate) const SPEED: &str = "speed";
 
 /// The flags that take a value.
-const FLAGS: [&str; 16] = [
+const FLAGS: [&str; 17] = [
     "--seed",
     "--cases",
     "--inputs",
@@ -91,6 +98,7 @@ const FLAGS: [&str; 16] = [
     "--keep",
     "--reports",
     "--tool",
+    "--same-as",
     "--out",
 ];
 
@@ -121,6 +129,8 @@ pub const HELP: &str = "prove: the blinded benchmark of the diagnosis
   --reports DIR judge the reports that --keep, or another program, left in DIR, and run no tool; with --cases-from
   --tool 'PROGRAM --rig {rig} --fit {fit} --holdout {holdout} --out {out}'  judge another program; a file that there are
                 several of is repeated with the flag before it
+  --same-as 'PROGRAM …'  with --tool: diagnose --cases N drawn recordings (100) with both programs, compare diagnosis.json and
+                patched-rig.toml to the digit, print the keys that differ, and fail if there is one
   --write DIR   write the recordings to DIR/cases and the key to DIR/key.json, and run nothing
   --calibrate A,B  print the weights of the tool's confidence from proof.json of earlier runs, and run nothing
   --out DIR     folder for proof.json and proof.md, of a folder of cases proof-NAME.json and proof-NAME.md (target); those of
@@ -181,6 +191,7 @@ impl Options {
                 "--keep" => options.keep = Some(PathBuf::from(value)),
                 "--reports" => options.reports = Some(PathBuf::from(value)),
                 "--tool" => options.tool = Some(value),
+                "--same-as" => options.same_as = Some(value),
                 _ => options.out = PathBuf::from(value),
             }
         }
@@ -206,6 +217,16 @@ impl Options {
         if !self.inject.is_empty() && others {
             return Err(
                 "--inject draws cases of its own, so it does not go with --cases-from, --write or --reports"
+                    .into(),
+            );
+        }
+        if self.same_as.is_some() && self.tool.is_none() {
+            return Err("--same-as goes with --tool: it compares two programs".into());
+        }
+        let others = others || self.quick || !self.inject.is_empty() || self.settle;
+        if self.same_as.is_some() && others {
+            return Err(
+                "--same-as draws recordings of its own; give it --tool, --cases, --seed, --only and --jobs"
                     .into(),
             );
         }
@@ -250,6 +271,9 @@ mod tests {
         assert!(parse("--reports r").unwrap_err().contains("one --cases-from"));
         assert!(parse("--write w --cases-from a").unwrap_err().contains("--write"));
         assert!(parse("--untouched a").unwrap_err().contains("--inject"));
+        assert!(parse("--same-as a").unwrap_err().contains("--tool"));
+        assert!(parse("--same-as a --tool b --quick").unwrap_err().contains("of its own"));
+        assert_eq!(parse("--same-as a --tool b").unwrap().unwrap().same_as, Some("a".into()));
         assert!(parse("--inject a --write b").unwrap_err().contains("--write"));
         assert!(parse("--seed").unwrap_err().contains("needs a value"));
     }

@@ -5,8 +5,9 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
-/// Applies `work` to every item on `jobs` threads; results in the items' order, `None` for what was not begun within
-/// `budget`. Progress goes to standard error if it is a terminal and nowhere otherwise.
+/// Applies `work` to every item on `jobs` threads; results in the items' order, `None` for what was
+/// not begun within `budget`. Progress goes to standard error if it is a terminal and nowhere
+/// otherwise.
 pub(crate) fn map<T: Sync, R: Send>(
     jobs: usize,
     budget: Option<Duration>,
@@ -17,8 +18,8 @@ pub(crate) fn map<T: Sync, R: Send>(
     map_and_save(jobs, budget, label, items, work, |_| ())
 }
 
-/// As [`map`]; `save` gets the results so far after each item, one call at a time, so that a run that is stopped has
-/// not been for nothing.
+/// As [`map`]; `save` gets the results so far after each item, one call at a time, so that a run
+/// that is stopped has not been for nothing.
 pub(crate) fn map_and_save<T: Sync, R: Send>(
     jobs: usize,
     budget: Option<Duration>,

@@ -1,4 +1,5 @@
-//! The honest table: what was wanted beside what was measured, on the terminal, as markdown and as JSON.
+//! The honest table: what was wanted beside what was measured, on the terminal, as markdown and as
+//! JSON.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;

@@ -1,5 +1,5 @@
-//! The residual on the held-out recording, measured as a key's oracle is: by the judge's own inverse dynamics, and by the
-//! residuals that the report gives.
+//! The residual on the held-out recording, measured as a key's oracle is: by the judge's own
+//! inverse dynamics, and by the residuals that the report gives.
 
 use std::path::Path;
 
@@ -52,7 +52,8 @@ pub(crate) fn measure(file: &Path, holdout: &str, oracle: &Oracle) -> Result<Lef
         }
         let number = |i: usize| fields.get(i).and_then(|f| f.parse::<f64>().ok()).filter(|x| x.is_finite());
         let Some(t) = number(time) else { continue };
-        // Empty at rest: friction is a reaction there; the filters see zero and the row is not judged.
+        // Empty at rest: friction is a reaction there; the filters see zero and the row is not
+        // judged.
         rows.push((t, number(refit).zip(number(patched)).map(|(a, b)| [a, b])));
     }
     if rows.len() < FEWEST_ROWS {
@@ -61,7 +62,8 @@ pub(crate) fn measure(file: &Path, holdout: &str, oracle: &Oracle) -> Result<Lef
     Ok(measure_rows(&rows, oracle))
 }
 
-/// The same for rows in hand: time, and the residuals under refit and patched model; `None` at rest.
+/// The same for rows in hand: time, and the residuals under refit and patched model; `None` at
+/// rest.
 pub(crate) fn measure_rows(rows: &[(f64, Option<[f64; 2]>)], oracle: &Oracle) -> Left {
     let start = rows[0].0;
     let rate = (rows.len() - 1) as f64 / (rows[rows.len() - 1].0 - start);
@@ -101,7 +103,7 @@ mod tests {
             .map(|i| {
                 let t = f64::from(i) * 1e-3;
                 let wave = (12.0 * t).sin() + (2500.0 * t).sin();
-                // What stands in the times at rest of the key is not judged.
+                // The times at rest of the key are not judged.
                 let size = if (3.0..3.8).contains(&t) { 50.0 } else { 1.0 };
                 (t, (!(6.0..6.5).contains(&t)).then_some([size * wave, 0.5 * wave]))
             })

@@ -1,5 +1,5 @@
-//! A small deterministic generator of random numbers (SplitMix64), so that a seed gives the same cases on every machine
-//! and with every version of every crate. Not for cryptography.
+//! A small deterministic generator of random numbers (SplitMix64), so that a seed gives the same
+//! cases on every machine and with every version of every crate. Not for cryptography.
 
 /// SplitMix64 (Steele, Lea, Flood 2014) with the draws that the cases need.
 #[derive(Clone, Debug)]

@@ -1,8 +1,10 @@
-//! The little numerics that strengths and baselines share: a zero-phase low-pass, differences, least squares.
+//! The little numerics that strengths and baselines share: a zero-phase low-pass, differences,
+//! least squares.
 
 use std::f64::consts::PI;
 
-/// Second-order Butterworth low-pass run forward and backward (zero phase, −6 dB at the corner), on an even grid.
+/// Second-order Butterworth low-pass run forward and backward (zero phase, −6 dB at the corner), on
+/// an even grid.
 pub(crate) fn low_pass(x: &[f64], rate: f64, corner_hz: f64) -> Vec<f64> {
     if x.is_empty() || corner_hz >= 0.45 * rate {
         return x.to_vec();
@@ -17,7 +19,8 @@ pub(crate) fn low_pass(x: &[f64], rate: f64, corner_hz: f64) -> Vec<f64> {
     backward
 }
 
-/// Second-order Butterworth low-pass run forward only (bilinear transform, prewarped), started settled on its first value.
+/// Second-order Butterworth low-pass run forward only (bilinear transform, prewarped), started
+/// settled on its first value.
 #[derive(Clone, Debug)]
 pub(crate) struct Butterworth {
     b: f64,
@@ -103,8 +106,8 @@ impl Normal {
         (self.gram[i * self.n + i] / self.rows.max(1) as f64).sqrt()
     }
 
-    /// Least squares over the columns in `active` with a penalty per column (empty: none); zeros elsewhere.
-    /// Columns that are numerically dependent get zero.
+    /// Least squares over the columns in `active` with a penalty per column (empty: none); zeros
+    /// elsewhere. Columns that are numerically dependent get zero.
     pub(crate) fn solve(&self, active: &[usize], penalty: &[f64]) -> Vec<f64> {
         let m = active.len();
         let mut a = vec![0.0; m * m];

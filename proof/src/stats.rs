@@ -1,6 +1,7 @@
 //! The judge's arithmetic.
 
-/// Wilson's 95 % interval of a proportion (Wilson 1927): (low, high), the whole of [0, 1] where there was no trial.
+/// Wilson's 95 % interval of a proportion (Wilson 1927): (low, high), the whole of [0, 1] where
+/// there was no trial.
 pub(crate) fn wilson(hits: usize, trials: usize) -> (f64, f64) {
     if trials == 0 {
         return (0.0, 1.0);

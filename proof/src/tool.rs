@@ -16,7 +16,7 @@ pub(crate) struct Paths {
 }
 
 impl Paths {
-    /// The same files in the folder `to`, which is created, where no key lies beside them.
+    /// The same files in the folder `to`, which is created, where no key is next to them.
     pub(crate) fn copied(&self, to: &Path) -> Result<Self, String> {
         std::fs::create_dir_all(to).map_err(|e| format!("cannot create {}: {e}", to.display()))?;
         let copy = |from: &PathBuf| {
@@ -31,7 +31,8 @@ impl Paths {
 
 /// Whatever turns a rig and recordings into the files of the contract.
 pub(crate) trait Tool: Sync {
-    /// Diagnoses and writes `diagnosis.json` and `patched-rig.toml` into `out`; the error is the tool's own sentence.
+    /// Diagnoses and writes `diagnosis.json` and `patched-rig.toml` into `out`; the error is the
+    /// tool's own sentence.
     fn diagnose(&self, paths: &Paths, out: &Path) -> Result<(), String>;
 }
 
@@ -51,8 +52,8 @@ impl Tool for Diagnosis {
     }
 }
 
-/// Another program, by a command line with `{rig}`, `{fit}`, `{holdout}` and `{out}` in it. The word that holds `{fit}` or
-/// `{holdout}` is repeated for every such file, with the flag before it.
+/// Another program, by a command line with `{rig}`, `{fit}`, `{holdout}` and `{out}` in it. The
+/// word that holds `{fit}` or `{holdout}` is repeated for every such file, with the flag before it.
 pub(crate) struct Program {
     pub(crate) line: String,
     /// It is stopped after this.
@@ -148,7 +149,8 @@ impl Named {
     }
 }
 
-/// An effect that came through the tool's search, with the evidence that its confidence weighs; named or not.
+/// An effect that came through the tool's search, with the evidence that its confidence weighs;
+/// named or not.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Weighed {
     pub(crate) name: String,

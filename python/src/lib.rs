@@ -1,5 +1,6 @@
-//! The diagnosis for Python. Rigs come as TOML and recordings as CSV, in the forms of `docs/recordings.md`, so that Python and the command
-//! line refuse the same things with the same sentences; the Python side turns frames and files into them. Nothing here computes.
+//! The diagnosis for Python. Rigs come as TOML and recordings as CSV, in the forms of
+//! `docs/recordings.md`, so that Python and the command line refuse the same things with the same
+//! sentences; the Python side turns frames and files into them. Nothing here computes.
 
 use convert::import;
 use diagnosis::recording::Recording;
@@ -98,8 +99,8 @@ fn simulate(py: Python, rig: Named, recording: Named) -> PyResult<(Vec<f64>, Vec
     })
 }
 
-/// Turns files as people have them into a folder of a rig and recordings. Returns the rig's path, the recordings' paths and what was
-/// assumed, changed or left out.
+/// Turns files as people have them into a folder of a rig and recordings. Returns the rig's path,
+/// the recordings' paths and what was assumed, changed or left out.
 #[pyfunction]
 fn import_recording(
     py: Python,

@@ -1,11 +1,13 @@
-//! The virtual device in the browser: the firmware's own control core on the plant, held by the scripted or a person's hand,
-//! behind functions of plain numbers and JSON texts. The page without a server (`cargo xtask site`) runs it in place of the
-//! WebSocket; `page/link.js` is the other side and speaks the same messages.
+//! The virtual device in the browser: the firmware's own control core on the plant, held by the
+//! scripted or a person's hand, behind functions of plain numbers and JSON texts. The page without
+//! a server (`cargo xtask site`) runs it in place of the WebSocket; `page/link.js` is the other
+//! side and speaks the same messages.
 //!
-//! The device itself is the crate `device-sim`, as host-sim has it: it gives the same bits here as there, which
-//! `cargo xtask test site` checks.
+//! The device itself is the crate `device-sim`, as host-sim has it: it gives the same bits here as
+//! there, which `cargo xtask test site` checks.
 //!
-//! The names are exported as they stand, which the language counts as unsafe; there is no other unsafe code.
+//! The names are exported as they stand, which the language counts as unsafe; there is no other
+//! unsafe code.
 
 pub mod simulation;
 
@@ -43,8 +45,8 @@ pub extern "C" fn said() -> usize {
     SAID.with_borrow(|said| said.as_ptr() as usize)
 }
 
-/// Starts the device with the built-in profile whose name is in the first `count` bytes of [`input`]; the length of what is
-/// said: nothing where it started, else why not.
+/// Starts the device with the built-in profile whose name is in the first `count` bytes of
+/// [`input`]; the length of what is said: nothing where it started, else why not.
 #[unsafe(no_mangle)]
 pub extern "C" fn start(count: u32) -> u32 {
     match Simulation::new(&heard(count)) {

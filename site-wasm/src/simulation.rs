@@ -1,4 +1,5 @@
-//! The virtual device, the PC's side of its link and what the page is told, in one thread and without a clock.
+//! The virtual device, the PC's side of its link and what the page is told, in one thread and
+//! without a clock.
 
 use device_sim::device::virtual_device::VirtualDevice;
 use device_sim::driver::Driver;
@@ -106,7 +107,8 @@ impl Simulation {
         });
     }
 
-    /// Does what the page asks for, if a device alone can; what is wrong with it where it asked for nonsense.
+    /// Does what the page asks for, if a device alone can; what is wrong with it where it asked for
+    /// nonsense.
     pub fn receive(&mut self, text: &str) -> Result<(), String> {
         let control = Control::parse(text)?;
         if let Some(hand) = control.hand() {

@@ -150,7 +150,7 @@ def a_needle_that_stops(device, report):
     fall = lambda t, held, more, tau: held + more * numpy.exp(-t / tau)
     (held, more, tau), _ = curve_fit(fall, time[::50], force[::50], p0=(0.6, 1.5, 0.3))
     report.within("a needle that stops: time constant of the wall", tau - 0.3, 0.03, "s")
-    report.within("a needle that stops: what is left, friction of wall and shaft", held - 2.0 * LUGRE["coulomb"], 0.1, "N")
+    report.within("a needle that stops: the rest, friction of wall and shaft", held - 2.0 * LUGRE["coulomb"], 0.1, "N")
 
 
 def stages_at_rest(device, report):
@@ -161,7 +161,7 @@ def stages_at_rest(device, report):
         recording = device.record(shoulder(skin_wall=False), hand(steps, tremor_mm=tremor_mm), 0.5 + 23.0 / 6.0 + 4.0)
         rest = recording.between(0.5 + 23.0 / 6.0 + 1.0, 0.5 + 23.0 / 6.0 + 3.9)
         seen.append(sorted({int(state) for state in recording.state[rest]}))
-    report.holds("stages told apart at rest, without and with tremor", len(seen[0]) == 1 and seen[0] == seen[1], f"{seen}")
+    report.holds("stages distinguished at rest, without and with tremor", len(seen[0]) == 1 and seen[0] == seen[1], f"{seen}")
 
 
 def direction(device, report):

@@ -1,5 +1,6 @@
-//! The bootloader that an STM32F407 has in ROM, at the end of a USB cable, with the rules of AN3156 and USB DFU 1.1: stricter than silicon where
-//! those leave a choice, so that an update that relies on a favour fails here.
+//! The bootloader that an STM32F407 has in ROM, at the end of a USB cable, with the rules of AN3156
+//! and USB DFU 1.1: stricter than silicon where those leave a choice, so that an update that relies
+//! on a favour fails here.
 
 use std::ops::{Range, RangeInclusive};
 
@@ -118,8 +119,9 @@ impl Bootloader {
         }
     }
 
-    /// The place of a block: ((wBlockNum − 2) × wTransferSize) + Address_Pointer, "where wTransferSize is the length of the requested data
-    /// buffer": of this block, and not of those before it.
+    /// The place of a block: ((wBlockNum − 2) × wTransferSize) + Address_Pointer, "where
+    /// wTransferSize is the length of the requested data buffer": of this block, and not of those
+    /// before it.
     fn address(&self, block: u16, length: usize) -> u32 {
         self.pointer + (u32::from(block) - 2) * length as u32
     }
@@ -204,7 +206,7 @@ impl Bootloader {
     }
 }
 
-/// The sector of the flash that an address lies in.
+/// The sector of the flash that holds an address.
 pub fn sector_of(address: u32) -> Option<Range<usize>> {
     let sizes = [16, 16, 16, 16, 64, 128, 128, 128, 128, 128, 128, 128];
     let offset = address.checked_sub(FLASH)? as usize;

@@ -1,5 +1,5 @@
-//! The board and the control core beside each other, tick for tick: what the pins show against what the core computes from the same
-//! counts and angles.
+//! The board and the control core side by side, tick for tick: what the pins show against what the
+//! core computes from the same counts and angles.
 
 use control_core::controller::{LargeOrder, Order, Sample, TickInput, TickOutput};
 use control_core::units::{Counts, Milliradians};
@@ -77,8 +77,9 @@ impl Replay<'_> {
     }
 }
 
-/// Runs a board whose hand begins after a second, under `config` or the default, for ten seconds, and sees that its codes, its enable
-/// line and its samples are the control core's, bit for bit; how many ticks each state counted, and how many walls gave way.
+/// Runs a board whose hand begins after a second, under `config` or the default, for ten seconds,
+/// and sees that its codes, its enable line and its samples are the control core's, bit for bit;
+/// how many ticks each state counted, and how many walls gave way.
 ///
 /// # Panics
 ///
@@ -104,8 +105,9 @@ pub fn follows(mut board: Board, config: Option<Config>) -> ([u32; 8], usize) {
     // The device numbers its ticks from the first one, and says in which it started.
     let mut events = pc.heard.events.iter();
     let started = events.find(|event| event.kind == EventKind::Started).expect("the device started").tick;
-    // The table of Paper 000 looks up speed and angle in one tick of four, counted from the tick that took the patient. No frame
-    // names that tick. The needle rests until long after it, so only its remainder by four matters.
+    // The table of Paper 000 looks up speed and angle in one tick of four, counted from the tick
+    // that took the patient. No frame names that tick. The needle rests until long after it, so
+    // only its remainder by four matters.
     let candidates: Vec<Option<u64>> = config.as_ref().map_or(vec![None], |_| (0..4).map(Some).collect());
     let plan = config.unwrap_or_else(Config::commissioned_virtual).plan().expect("it may run");
     let replay = Replay { plan, started, samples: &pc.heard.samples };

@@ -1,5 +1,6 @@
-//! A configuration of each law for the board: as many layers as there may be, everything on that a value turns on. The board
-//! lies level; laid on the skin it would stand upright, so that the needle goes straight in.
+//! A configuration of each law for the board: as many layers as there may be, everything on that a
+//! value turns on. The board lies level; laid on the skin it would stand upright, so that the
+//! needle goes straight in.
 
 use control_core::Config;
 use control_core::config::{

@@ -1,5 +1,6 @@
-//! A roller with forces of its own: cogging by the rotor's angle, dry and viscous friction, a weight by tilt; with or without a
-//! hand on its needle. The numbers are those of `fixtures/hidden.toml`, which nothing but the diagnosis has seen.
+//! A roller with forces of its own: cogging by the rotor's angle, dry and viscous friction, a
+//! weight by tilt; with or without a hand on its needle. The numbers are those of
+//! `fixtures/hidden.toml`, which nothing but the diagnosis has seen.
 
 use std::f64::consts::TAU;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -46,7 +47,8 @@ impl Mechanism {
         Self { rotor, tilt, depth: 0.0, speed: 0.0, way: None, time: 0.0, hand_force: 0.0 }
     }
 
-    /// A hand leads the needle along `way` from now on, whose times count from now; `None`: it lets go.
+    /// A hand leads the needle along `way` from now on, whose times count from now; `None`: it lets
+    /// go.
     pub fn lead(&mut self, way: Option<Way>) {
         self.way = way.map(|way| way.into_iter().map(|(at, depth)| (self.time + at, depth)).collect());
     }

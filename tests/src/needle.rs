@@ -1,4 +1,5 @@
-//! A needle of 30 g on the roller, with or without a hand on it: what moves as physics has it, and not along a path.
+//! A needle of 30 g on the roller, with or without a hand on it: what moves as physics has it, and
+//! not along a path.
 
 use std::sync::{Arc, Mutex, PoisonError};
 

@@ -149,8 +149,8 @@ impl Pc {
         self.command(board, command).result.expect_err("the device refuses")
     }
 
-    /// Sends a command that the device has to carry out. Where it does not know its depth when it is to start, the tip is on the
-    /// skin now, as a person says who is told so.
+    /// Sends a command that the device has to carry out. Where it does not know its depth when it
+    /// is to start, the tip is on the skin now, as a person says who is told so.
     ///
     /// # Panics
     ///
@@ -174,7 +174,8 @@ impl Pc {
         self.must(board, Command::ConfigurePatient(config.patient.clone()));
     }
 
-    /// The command that gives the device at the other end its own record back, were it one of `device`.
+    /// The command that gives the device at the other end its own record back, were it one of
+    /// `device`.
     ///
     /// # Panics
     ///

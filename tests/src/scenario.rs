@@ -27,7 +27,8 @@ pub fn venepuncture(start: Nanos) -> impl PlantSide {
     ]))
 }
 
-/// The same as far in as the deepest layer of [`crate::laws`], with a rest on the way, in nine seconds.
+/// The same as far in as the deepest layer of [`crate::laws`], with a rest on the way, in nine
+/// seconds.
 #[must_use]
 pub fn deep(start: Nanos) -> impl PlantSide {
     let mm = |depth: i64| depth * COUNTS_PER_MM;

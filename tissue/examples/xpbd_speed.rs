@@ -1,6 +1,7 @@
-//! Time of a step of the tissue picture on one core, for `cargo xtask bench`: at least 5,000 particles, a needle that goes in
-//! and out. Prints `xpbd_step_ms=…`, the median over all steps, and the time of a step on meshes of about one, ten and a hundred
-//! times as many particles. Where `XPBD_MESH` names a file, the mesh is written there for the peer `xtask/peers/soft_body.py`.
+//! Time of a step of the tissue picture on one core, for `cargo xtask bench`: at least 5,000
+//! particles, a needle that goes in and out. Prints `xpbd_step_ms=…`, the median over all steps,
+//! and the time of a step on meshes of about one, ten and a hundred times as many particles. Where
+//! `XPBD_MESH` names a file, the mesh is written there for the peer `xtask/peers/soft_body.py`.
 
 use std::path::Path;
 use std::time::Instant;
@@ -9,8 +10,8 @@ use tissue::{Configuration, Needle, Tissue};
 const STEPS: usize = 600;
 const STEP_S: f32 = 1.0 / 60.0;
 
-/// Particles of meshes of about one, ten and a hundred times as many, at least, and the steps of each; 20,000 are the most that
-/// are possible.
+/// Particles of meshes of about one, ten and a hundred times as many, at least, and the steps of
+/// each; 20,000 are the most that are possible.
 const WORK: [(usize, usize); 3] = [(180, 400), (1_800, 100), (18_000, 20)];
 
 fn main() {
@@ -51,8 +52,8 @@ fn main() {
     }
 }
 
-/// Writes as JSON: the particles at rest, mm, each with its inverse mass, 1/g; the distances and the volumes, each as corners, rest value
-/// (mm, mm³) and compliance; the substeps of a picture.
+/// Writes as JSON: the particles at rest, mm, each with its inverse mass, 1/g; the distances and
+/// the volumes, each as corners, rest value (mm, mm³) and compliance; the substeps of a picture.
 fn write_mesh(tissue: &Tissue, substeps: u32, path: &Path) {
     let list = |items: Vec<String>| format!("[{}]", items.join(","));
     let points = tissue.rest().iter().map(|point| format!("{point:?}")).collect();

@@ -14,7 +14,8 @@ const TIE: f32 = 1e-6;
 /// The part of the body that a surface shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
-    /// The skin on the far side of the needle's plane (y < 0), as one sees it with the insertion to the right.
+    /// The skin on the far side of the needle's plane (y < 0), as one sees it with the insertion to
+    /// the right.
     SkinBehind,
     /// The skin on the near side.
     SkinBefore,
@@ -102,12 +103,14 @@ impl Tissue {
         self.insertion.set_punctures(punctures);
     }
 
-    /// The device says that a wall gave way ([`PunctureState::Inserted`]) or that the needle has left it.
+    /// The device says that a wall gave way ([`PunctureState::Inserted`]) or that the needle has
+    /// left it.
     pub fn tell(&mut self, wall: WallName, state: PunctureState) {
         self.insertion.tell(wall, state);
     }
 
-    /// Moves time on by `dt` s (at most 0.1), the needle being where it says. A needle that is no number stays where it was.
+    /// Moves time on by `dt` s (at most 0.1), the needle being where it says. A needle that is no
+    /// number stays where it was.
     pub fn step(&mut self, needle: &Needle, dt: f32) {
         if !(dt.is_finite() && dt > 0.0) {
             return;
@@ -140,7 +143,8 @@ impl Tissue {
         &self.surfaces
     }
 
-    /// Normals of skin, tops of layers and vessel at every particle, not of length 1; the sections are flat and have none.
+    /// Normals of skin, tops of layers and vessel at every particle, not of length 1; the sections
+    /// are flat and have none.
     pub fn normals(&mut self) -> &[[f32; 4]] {
         let points = self.solver.points();
         self.normals.fill([0.0; 4]);
@@ -179,8 +183,8 @@ impl Tissue {
     }
 }
 
-/// Ties the lower surface of one layer to the upper one of the next: the particles of the finer one to their places in the
-/// other, so that none hangs free.
+/// Ties the lower surface of one layer to the upper one of the next: the particles of the finer one
+/// to their places in the other, so that none hangs free.
 fn tie_layers(above: &Lattice, below: &Lattice, parts: &mut Parts) {
     let upper_is_finer = above.nx * above.ny > below.nx * below.ny;
     let (from, onto, row) = if upper_is_finer { (above, below, above.nz - 1) } else { (below, above, 0) };

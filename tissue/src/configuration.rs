@@ -24,14 +24,16 @@ pub struct Layer {
     pub volume_ratio: f32,
     /// Its bulk modulus, kPa.
     pub bulk_kpa: f32,
-    /// Angle between the planes of its upper surface at rest, in degrees, 180 being flat: θ₀ of Table 1. `None` keeps the angle
-    /// as built.
+    /// Angle between the planes of its upper surface at rest, in degrees, 180 being flat: θ₀ of
+    /// Table 1. `None` keeps the angle as built.
     pub bending_deg: Option<f32>,
     /// Bending stiffness of its upper surface, µN·mm/rad.
     pub bending_stiffness: f32,
-    /// The travel by which its upper surface is pushed in before it gives way, mm; 0 if it does not resist.
+    /// The travel by which its upper surface is pushed in before it gives way, mm; 0 if it does not
+    /// resist.
     pub gives_mm: f32,
-    /// The travel over which tissue that the needle has pierced is dragged along its axis before it slips, mm.
+    /// The travel over which tissue that the needle has pierced is dragged along its axis before it
+    /// slips, mm.
     pub drag_mm: f32,
 }
 
@@ -46,7 +48,8 @@ pub struct Vessel {
     pub horizontal_mm: f32,
     /// A point on its axis: x in mm from the entry, y in mm across.
     pub centre_mm: [f32; 2],
-    /// Angle of its axis to the x axis, in degrees; 90 is a vessel cut across by the needle's plane.
+    /// Angle of its axis to the x axis, in degrees; 90 is a vessel cut across by the needle's
+    /// plane.
     pub axis_deg: f32,
     /// Young's modulus of the wall, kPa.
     pub stiffness_kpa: f32,
@@ -60,18 +63,21 @@ pub struct Vessel {
     pub far_gives_mm: f32,
     /// The travel over which the pierced wall is dragged along, mm.
     pub drag_mm: f32,
-    /// Its centre line through the block, mm, if it is not straight; then `top_mm`, `centre_mm` and `axis_deg` do not count.
+    /// Its centre line through the block, mm, if it is not straight; then `top_mm`, `centre_mm` and
+    /// `axis_deg` do not count.
     pub path_mm: Vec<[f32; 3]>,
 }
 
-/// Curved layers: the height of the top of each, and of the bottom of the last, over a grid that spans the block.
+/// Curved layers: the height of the top of each, and of the bottom of the last, over a grid that
+/// spans the block.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Relief {
     /// Points of the grid along the insertion, at least 2.
     pub columns: usize,
     /// Points across it, at least 2.
     pub lines: usize,
-    /// For each top from the skin inwards, and for the bottom, `lines` × `columns` depths in mm, line after line.
+    /// For each top from the skin inwards, and for the bottom, `lines` × `columns` depths in mm,
+    /// line after line.
     pub faces_mm: Vec<Vec<f32>>,
 }
 
@@ -118,10 +124,11 @@ pub struct Configuration {
     pub half_width_mm: f32,
     /// Radius of the limb across, mm; `None` is flat.
     pub limb_radius_mm: Option<f32>,
-    /// Curved layers; then each layer's depth and thickness say only how many rows it has and how stiff they are.
+    /// Curved layers; then each layer's depth and thickness say only how many rows it has and how
+    /// stiff they are.
     pub relief: Option<Relief>,
-    /// Density of the particles, g/mm³. Heavier than tissue (1e-3), so that the soft layers answer within a frame or two what a
-    /// few iterations can solve (mass scaling).
+    /// Density of the particles, g/mm³. Heavier than tissue (1e-3), so that the soft layers answer
+    /// within a frame or two what a few iterations can solve (mass scaling).
     pub density: f32,
     /// Substeps of a step.
     pub substeps: u32,
@@ -210,10 +217,12 @@ impl Default for Configuration {
 }
 
 impl Configuration {
-    /// Paper 000: skin, vessel, skin, with the values of its Table 1. They have no unit there; L₀ is taken as metres (10, 15 and
-    /// 12 mm between particles), V₀ as a share of the volume as built, the bending angles as angles between planes, 180° being
-    /// flat. The vessel's 0° is a wall folded on itself: taken literally and made weak, it is a vessel that tends to collapse
-    /// (the table's "low-stiffness vascular response"). Thicknesses, stiffnesses and the depths at which walls give way are ours.
+    /// Paper 000: skin, vessel, skin, with the values of its Table 1. They have no unit there; L₀
+    /// is taken as metres (10, 15 and 12 mm between particles), V₀ as a share of the volume as
+    /// built, the bending angles as angles between planes, 180° being flat. The vessel's 0° is a
+    /// wall folded on itself: taken literally and made weak, it is a vessel that tends to collapse
+    /// (the table's "low-stiffness vascular response"). Thicknesses, stiffnesses and the depths at
+    /// which walls give way are ours.
     pub fn paper_000() -> Self {
         let layer = |name: &str, top_mm, thickness_mm, l0_m: f32, v0, theta_deg, stiffness_kpa| Layer {
             name: name.into(),
@@ -243,9 +252,10 @@ impl Configuration {
         }
     }
 
-    /// Returns the tissue of Table 1 in a block as large as the default limb, with the outer faces of its layers at 0, `near_mm` and
-    /// `far_mm`, its end at `bottom_mm`, and walls that give way after `gives_mm`. Spacings and drag are scaled by `bottom_mm` over the
-    /// depth of the paper's block, so that they keep their ratios. None if the faces are not one below the other.
+    /// Returns the tissue of Table 1 in a block as large as the default limb, with the outer faces
+    /// of its layers at 0, `near_mm` and `far_mm`, its end at `bottom_mm`, and walls that give way
+    /// after `gives_mm`. Spacings and drag are scaled by `bottom_mm` over the depth of the paper's
+    /// block, so that they keep their ratios. None if the faces are not one below the other.
     pub fn table_1(near_mm: f32, far_mm: f32, bottom_mm: f32, gives_mm: [f32; 3]) -> Option<Self> {
         if !(near_mm > 0.0 && far_mm > near_mm && bottom_mm > far_mm) {
             return None;

@@ -1,8 +1,10 @@
-//! The constraints: distance, volume of a tetrahedron, bending angle, tie of a particle to a place between others.
+//! The constraints: distance, volume of a tetrahedron, bending angle, tie of a particle to a place
+//! between others.
 //!
-//! Each is solved for itself, one after the other (Gauss–Seidel), by
-//! `Δλ = −(C + α̃·λ)/(Σ w|∇C|² + α̃)`, `Δx = w·∇C·Δλ`, `α̃ = α/dt²` (Macklin et al. 2016, eq. 17 and 18), `λ` being kept over
-//! the iterations of a substep. `w` is the inverse mass in 1/g, `α` the compliance, the inverse of a stiffness.
+//! Each is solved for itself, one after the other (Gauss–Seidel), by `Δλ = −(C + α̃·λ)/(Σ w|∇C|² +
+//! α̃)`, `Δx = w·∇C·Δλ`, `α̃ = α/dt²` (Macklin et al. 2016, eq. 17 and 18), `λ` being kept over the
+//! iterations of a substep. `w` is the inverse mass in 1/g, `α` the compliance, the inverse of a
+//! stiffness.
 
 use crate::vector::{Vector, add, cross, dot, length, scale, sub};
 
@@ -24,9 +26,11 @@ fn shift(point: &mut Point, by: Vector) {
 
 /// One constraint: what the solver has to know of it.
 pub(crate) trait Constraint {
-    /// The particles that it moves; the same number for every constraint of a type, unused ones repeat a used one.
+    /// The particles that it moves; the same number for every constraint of a type, unused ones
+    /// repeat a used one.
     fn particles(&self) -> impl Iterator<Item = u32>;
-    /// One projection. `inverse_dt2` is 1/dt² in 1/s²; `lambda` is the multiplier so far in this substep.
+    /// One projection. `inverse_dt2` is 1/dt² in 1/s²; `lambda` is the multiplier so far in this
+    /// substep.
     fn project(&self, points: &mut [Point], lambda: &mut f32, inverse_dt2: f32);
     /// Returns its violation (in its own unit) and its compliance α: the energy is C²/(2α).
     fn violation(&self, points: &[Point]) -> (f32, f32);
@@ -154,8 +158,9 @@ impl Constraint for Volume {
     }
 }
 
-/// `C = θ − θ₀` of two triangles that share an edge, Paper 000. θ is the angle between their normals in rad, signed: 0 is flat.
-/// Paper 000's angle is the one between the planes, 180° where they are flat: θ₀ = π − it.
+/// `C = θ − θ₀` of two triangles that share an edge, Paper 000. θ is the angle between their
+/// normals in rad, signed: 0 is flat. Paper 000's angle is the one between the planes, 180° where
+/// they are flat: θ₀ = π − it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bending {
     /// The two ends of the edge, then the two corners beside it.
@@ -166,8 +171,8 @@ pub struct Bending {
     pub compliance: f32,
 }
 
-/// The angle between two triangles and its gradients at the four corners (Bridson, Marino, Fedkiw 2003); `None` where a
-/// triangle has no area.
+/// The angle between two triangles and its gradients at the four corners (Bridson, Marino, Fedkiw
+/// 2003); `None` where a triangle has no area.
 #[inline]
 fn angle(p: [Vector; 4]) -> Option<(f32, [Vector; 4])> {
     let edge = sub(p[1], p[0]);
@@ -192,7 +197,8 @@ fn angle(p: [Vector; 4]) -> Option<(f32, [Vector; 4])> {
     ))
 }
 
-/// Angle between the normals of two triangles that share the edge `p[0]`, `p[1]`, in rad; 0 where they are flat.
+/// Angle between the normals of two triangles that share the edge `p[0]`, `p[1]`, in rad; 0 where
+/// they are flat.
 pub(crate) fn bending_angle(p: [Vector; 4]) -> f32 {
     angle(p).map_or(0.0, |(angle, _)| angle)
 }

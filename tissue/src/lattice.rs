@@ -41,8 +41,8 @@ pub(crate) struct Extent<'a> {
     pub(crate) density: f32,
 }
 
-/// Tetrahedra of a cell by its corners (bit 0: x, bit 1: y, bit 2: z), in two orientations that alternate, so that the
-/// diagonals of neighbours meet.
+/// Tetrahedra of a cell by its corners (bit 0: x, bit 1: y, bit 2: z), in two orientations that
+/// alternate, so that the diagonals of neighbours meet.
 const TETRAHEDRA: [[[usize; 4]; 5]; 2] = [
     [[0, 1, 2, 4], [3, 2, 1, 7], [5, 4, 7, 1], [6, 7, 4, 2], [1, 2, 4, 7]],
     [[1, 0, 5, 3], [2, 3, 6, 0], [4, 5, 0, 6], [7, 6, 3, 5], [0, 3, 6, 5]],
@@ -177,7 +177,7 @@ impl Lattice {
         }
         let mut add = |corners: [u32; 4]| {
             let built = bending_angle(corners.map(|index| place(&parts.points[index as usize])));
-            // The table's angle lies between the planes; ours between their normals.
+            // The table's angle is between the planes; ours is between their normals.
             let rest = layer.bending_deg.map_or(built, |degrees| std::f32::consts::PI - degrees.to_radians());
             parts.bendings.push(Bending { corners, rest, compliance: 1.0 / layer.bending_stiffness });
         };
@@ -241,7 +241,8 @@ impl Lattice {
         self.ny / 2
     }
 
-    /// The tissue that was at `rest` before anything moved: a mean of the eight corners of its cell; `None` outside.
+    /// The tissue that was at `rest` before anything moved: a mean of the eight corners of its
+    /// cell; `None` outside.
     pub(crate) fn anchor(&self, rest: Vector) -> Option<Anchor> {
         let [top, bottom] = self.span(rest[0], rest[1]);
         let deep = (rest[2] - top) / (bottom - top);

@@ -1,9 +1,10 @@
 //! The needle in the tissue: a puncture state for every wall, and what it holds on to.
 //!
-//! A wall is away, touching (the tip pushes it in and carries what lies under it) or inserted (its pierced place is held to
-//! the needle's axis and dragged along it). In between, the tissue is held to the shaft at points a little apart. Whatever
-//! the needle does, no place is ever wanted farther from its rest than the wall's give, the drag and `TEAR_MM` allow: this
-//! keeps the picture bounded.
+//! A wall is away, touching (the tip pushes it in and carries what lies under it) or inserted (its
+//! pierced place is held to the needle's axis and dragged along it). In between, the tissue is held
+//! to the shaft at points a little apart. Whatever the needle does, no place is ever wanted farther
+//! from its rest than the wall's give, the drag and `TEAR_MM` allow: this keeps the picture
+//! bounded.
 
 use crate::constraint::{Anchor, Point, place};
 use crate::vector::{Vector, add, cross, direction, dot, is_finite, length, scale, sub};
@@ -16,7 +17,8 @@ const RECOVERY_S: f32 = 0.08;
 const SHAFT_MM: f32 = 1.2;
 /// Most places held along the shaft.
 const MOST_HOLDS: usize = 48;
-/// A wall that others say still holds gives way this much later than its own depth, mm: the page was opened late.
+/// A wall that others say still holds gives way this much later than its own depth, mm: the page
+/// was opened late.
 const LATE_MM: f32 = 2.0;
 /// The length back along the needle over which a wall is looked for, mm.
 const NEEDLE_MM: f32 = 80.0;
@@ -31,8 +33,8 @@ pub struct Needle {
 }
 
 impl Needle {
-    /// Its tip `depth_mm` past the entry point (the origin) along an axis `angle` rad below the skin, turned `azimuth` rad
-    /// about the vertical through the entry. What is no number is 0.
+    /// Its tip `depth_mm` past the entry point (the origin) along an axis `angle` rad below the
+    /// skin, turned `azimuth` rad about the vertical through the entry. What is no number is 0.
     pub fn entering(depth_mm: f32, angle: f32, azimuth: f32) -> Self {
         let number = |value: f32| if value.is_finite() { value } else { 0.0 };
         let (sine, cosine) = number(angle).sin_cos();
@@ -101,7 +103,8 @@ impl Hold {
         Self { anchor, home, drag: pushed.clamp(-drag_limit, drag_limit), most }
     }
 
-    /// Returns the point on the needle's axis that it belongs to, and its distance from that point across the axis.
+    /// Returns the point on the needle's axis that it belongs to, and its distance from that point
+    /// across the axis.
     fn target(&self, needle: &Needle) -> (Vector, f32) {
         let along = dot(sub(self.home, needle.tip), needle.direction);
         let on_axis = add(needle.tip, scale(needle.direction, along));
@@ -166,7 +169,8 @@ impl Wall {
         self.indentation = 0.0;
     }
 
-    /// Returns the first place at which the needle's axis, up to its tip, passes through it: from inside if `from_inside`.
+    /// Returns the first place at which the needle's axis, up to its tip, passes through it: from
+    /// inside if `from_inside`.
     fn crossing(&self, points: &[Point], needle: &Needle) -> Option<Anchor> {
         let from_inside = self.name == WallName::Far;
         let mut first: Option<(f32, Anchor)> = None;
@@ -188,8 +192,8 @@ impl Wall {
     }
 }
 
-/// Returns where a needle's axis meets a triangle: mm past the tip, weights of the corners, whether it goes in there (against the
-/// triangle's normal). Möller and Trumbore 1997.
+/// Returns where a needle's axis meets a triangle: mm past the tip, weights of the corners, whether
+/// it goes in there (against the triangle's normal). Möller and Trumbore 1997.
 fn meet(p: [Vector; 3], needle: &Needle) -> Option<(f32, [f32; 3], bool)> {
     let (e1, e2) = (sub(p[1], p[0]), sub(p[2], p[0]));
     let h = cross(needle.direction, e2);
@@ -252,7 +256,8 @@ impl Insertion {
         self.walls.first().and_then(|wall| wall.touch).map(|(anchor, _)| anchor)
     }
 
-    /// Follows the needle to where it is now; `material` finds the tissue that was at a place at rest.
+    /// Follows the needle to where it is now; `material` finds the tissue that was at a place at
+    /// rest.
     pub(crate) fn follow(
         &mut self,
         needle: Needle,
@@ -303,7 +308,8 @@ impl Insertion {
         if self.shaft.len() >= MOST_HOLDS || self.shaft.iter().any(near) {
             return;
         }
-        // The tissue at the tip: looked for at the tip, then where the displacement found there says.
+        // The tissue at the tip: looked for at the tip, then where the displacement found there
+        // says.
         let mut wanted = needle.tip;
         let mut found = None;
         for _ in 0..3 {
@@ -344,7 +350,8 @@ impl Insertion {
     }
 }
 
-/// Moves the state of one wall on. `motion`: the needle, how far it went along itself (mm), in what time (s).
+/// Moves the state of one wall on. `motion`: the needle, how far it went along itself (mm), in what
+/// time (s).
 fn step_wall(
     wall: &mut Wall,
     open: bool,

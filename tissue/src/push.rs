@@ -1,4 +1,5 @@
-//! A needle that pushes straight down on tissue and pierces nothing: what that does to each configuration.
+//! A needle that pushes straight down on tissue and pierces nothing: what that does to each
+//! configuration.
 
 use crate::body::Tissue;
 use crate::configuration::{Configuration, Layer, Refusal, Vessel};
@@ -37,11 +38,13 @@ pub struct Pushed {
     pub energy_mj: f64,
     /// Force of the constraints on the needle, N.
     pub force_n: f64,
-    /// Sum of the squared forces on particles that nothing holds, as a share of the force on the needle: 0 in equilibrium.
+    /// Sum of the squared forces on particles that nothing holds, as a share of the force on the
+    /// needle: 0 in equilibrium.
     pub residual: f64,
 }
 
-/// The configurations of Paper 000's Table 1, each layer by itself and all three tied, and the default limb; each with its name.
+/// The configurations of Paper 000's Table 1, each layer by itself and all three tied, and the
+/// default limb; each with its name.
 pub fn configurations() -> Vec<(&'static str, Configuration)> {
     let table = Configuration::paper_000();
     let alone = |layer: &Layer| Configuration {
@@ -55,7 +58,8 @@ pub fn configurations() -> Vec<(&'static str, Configuration)> {
     all
 }
 
-/// Pushes straight down by `depth_mm` from where the tissue's surface lies at rest; no wall gives way.
+/// Pushes straight down by `depth_mm` from where the tissue's surface lies at rest; no wall gives
+/// way.
 pub fn push(configuration: &Configuration, depth_mm: f32, division: Division) -> Result<Pushed, Refusal> {
     let mut configuration = configuration.clone();
     let firm = |layer: &mut Layer| layer.gives_mm = 50.0;

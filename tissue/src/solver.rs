@@ -3,9 +3,11 @@
 use crate::constraint::{Bending, Constraint, Distance, Point, Tie, Volume, place};
 use crate::vector::{add, dot, length, scale, sub};
 
-/// Fastest that a particle may move, mm/s: far above what tissue does, below what would leave the picture in one step.
+/// Fastest that a particle may move, mm/s: far above what tissue does, below what would leave the
+/// picture in one step.
 const FASTEST: f32 = 2_000.0;
-/// Farthest that a particle goes from where it was built, mm: more than any tissue between skin and bone does.
+/// Farthest that a particle goes from where it was built, mm: more than any tissue between skin and
+/// bone does.
 const FARTHEST_MM: f32 = 18.0;
 /// Colours that a greedy colouring may use; the rest goes unsorted at the end.
 const MOST_COLOURS: usize = 64;
@@ -18,7 +20,8 @@ struct Group<C> {
 }
 
 impl<C: Constraint + Copy> Group<C> {
-    /// Sorted so that neighbours in the list share no particle: the processor then works on several at once.
+    /// Sorted so that neighbours in the list share no particle: the processor then works on several
+    /// at once.
     fn new(constraints: Vec<C>, particles: usize) -> Self {
         let mut taken = vec![0_u64; particles];
         let mut colours: Vec<Vec<C>> = vec![];
@@ -132,8 +135,8 @@ impl Solver {
         }
     }
 
-    /// Moves time on by `dt` s. `hold` moves particles as something outside wants it, once in every iteration; it is given
-    /// the particles and 1/dt² of the substep.
+    /// Moves time on by `dt` s. `hold` moves particles as something outside wants it, once in every
+    /// iteration; it is given the particles and 1/dt² of the substep.
     pub fn step(&mut self, dt: f32, pace: Pace, mut hold: impl FnMut(&mut [Point], f32)) {
         let substeps = pace.substeps.max(1);
         let dt = dt / substeps as f32;
@@ -220,7 +223,8 @@ impl Solver {
             + self.ties.energy(&self.points)
     }
 
-    /// Returns the force of all constraints on each particle, µN: zero at rest, except where something holds it.
+    /// Returns the force of all constraints on each particle, µN: zero at rest, except where
+    /// something holds it.
     pub fn forces(&self) -> Vec<[f64; 3]> {
         let mut forces = vec![[0.0; 3]; self.points.len()];
         self.distances.push(&self.points, &mut forces);

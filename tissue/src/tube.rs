@@ -1,4 +1,5 @@
-//! A vessel as a tube of rings: wall of distances and bending angles, a lumen that keeps its volume, ties to the tissue around.
+//! A vessel as a tube of rings: wall of distances and bending angles, a lumen that keeps its
+//! volume, ties to the tissue around.
 
 use crate::configuration::Vessel;
 use crate::constraint::{Bending, Distance, Volume, bending_angle, place, volume};
@@ -23,7 +24,8 @@ pub(crate) struct Tube {
 }
 
 impl Tube {
-    /// Adds the vessel's particles and constraints to `parts`; it runs from one side of the block to the other, or along its path.
+    /// Adds the vessel's particles and constraints to `parts`; it runs from one side of the block
+    /// to the other, or along its path.
     pub(crate) fn build(vessel: &Vessel, extent: Extent<'_>, parts: &mut Parts) -> Self {
         let line = if vessel.path_mm.is_empty() { straight(vessel, extent) } else { vessel.path_mm.clone() };
         let long: f32 = line.windows(2).map(|ends| length(sub(ends[1], ends[0]))).sum();
@@ -138,7 +140,8 @@ impl Tube {
         }
         for ring in 0..self.rings - 1 {
             for number in 0..AROUND {
-                // About the long edges: what keeps it open. The corners are the diagonals' other ends.
+                // About the long edges: what keeps it open. The corners are the diagonals' other
+                // ends.
                 let corners = [
                     self.at(ring, number),
                     self.at(ring + 1, number),

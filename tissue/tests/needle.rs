@@ -1,4 +1,5 @@
-//! The needle in the tissue: what is pushed in, what is dragged along, and that nothing it does breaks the picture.
+//! The needle in the tissue: what is pushed in, what is dragged along, and that nothing it does
+//! breaks the picture.
 
 use proptest::prelude::*;
 use tissue::body::Part;
@@ -217,7 +218,8 @@ proptest! {
             let tip = direction.map(|component| component * depth);
             tissue.step(&Needle { tip, direction }, dt);
             let energy = tissue.solver().energy();
-            // 5 mm of the stiffest layer all over; a needle that jumps by 100 mm a step came to 1.1e9.
+            // 5 mm of the stiffest layer all over; a needle that jumps by 100 mm a step came to
+            // 1.1e9.
             prop_assert!(energy.is_finite() && energy < 1e10, "energy {energy} nJ");
             prop_assert!(farthest_from_rest(&tissue) < 20.0, "{} mm", farthest_from_rest(&tissue));
         }

@@ -1,5 +1,5 @@
-//! Time of an image of 256 lines × 1,024 samples on one core, for `cargo xtask bench`: three layers, a vessel, a needle, the
-//! probe moving. Prints `ultrasound_frame_ms=…`, the median.
+//! Time of an image of 256 lines × 1,024 samples on one core, for `cargo xtask bench`: three
+//! layers, a vessel, a needle, the probe moving. Prints `ultrasound_frame_ms=…`, the median.
 
 use std::time::Instant;
 use ultrasound::medium::{BLOOD, FAT, MUSCLE, SKIN};

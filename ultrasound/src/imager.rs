@@ -1,7 +1,7 @@
 //! From a section to an image: echoes, scatterers, pulse and beam, envelope, compression.
 //!
-//! All in baseband (in-phase and quadrature), a line of samples at a time, in arrays that the processor can work on four at
-//! once; nothing but a line's first crossings allocates.
+//! All in baseband (in-phase and quadrature), a line of samples at a time, in arrays that the
+//! processor can work on four at once; nothing but a line's first crossings allocates.
 
 use crate::medium::{ASSUMED_SPEED, Medium, STEEL, VESSEL_WALL};
 use crate::plane::{Crossing, Mesh, cut};
@@ -13,7 +13,8 @@ pub const LINES: usize = 256;
 /// Samples of a line.
 pub const SAMPLES: usize = 1024;
 
-/// Planes that the thickness of the beam is made of: how far beside the image's (standard deviations), and their weight.
+/// Planes that the thickness of the beam is made of: how far beside the image's (standard
+/// deviations), and their weight.
 const PLANES: [(f32, f32); 3] = [(-1.0, 0.25), (0.0, 0.5), (1.0, 0.25)];
 /// Speckle of muscle against full reflection, dB.
 const MUSCLE_SPECKLE_DB: f32 = -38.0;
@@ -134,7 +135,8 @@ impl Imager {
         &self.image
     }
 
-    /// Intensity of the last image in dB of full reflection, before gain and compression; line after line.
+    /// Intensity of the last image in dB of full reflection, before gain and compression; line
+    /// after line.
     pub fn power_db(&self) -> impl Iterator<Item = f32> {
         self.power.iter().map(|power| 10.0 * power.max(1e-30).log10())
     }
@@ -311,7 +313,8 @@ struct Piece {
     echo: Option<(f32, f32)>,
 }
 
-/// Goes down a line from medium to medium. Depths become those that the machine shows, which takes 1540 m/s for all.
+/// Goes down a line from medium to medium. Depths become those that the machine shows, which takes
+/// 1540 m/s for all.
 fn follow_line(probe: &Probe, scene: &Scene<'_>, crossings: &[Crossing], mut take: impl FnMut(Piece)) {
     let sample_mm = probe.depth_mm / SAMPLES as f32;
     let mut layer = scene.first;
@@ -363,7 +366,8 @@ fn follow_line(probe: &Probe, scene: &Scene<'_>, crossings: &[Crossing], mut tak
     }
 }
 
-/// Returns where the beam of a line meets the needle: depth, share of the beam's pressure there, distance behind the tip.
+/// Returns where the beam of a line meets the needle: depth, share of the beam's pressure there,
+/// distance behind the tip.
 fn meet(
     probe: &Probe,
     lateral: f32,
@@ -445,7 +449,8 @@ fn column_start(column: i64, cell: i64, turned: i64) -> usize {
     ((mixed >> 20) as usize) % (NOISE - SAMPLES)
 }
 
-/// In-phase and quadrature of scatterers: two Gaussian numbers each (Box and Muller), of variance a half.
+/// In-phase and quadrature of scatterers: two Gaussian numbers each (Box and Muller), of variance a
+/// half.
 fn scatterers(seed: u64) -> [Vec<f32>; 2] {
     let mut state = seed;
     let mut unit = || {

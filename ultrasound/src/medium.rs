@@ -48,12 +48,14 @@ impl Medium {
         }
     }
 
-    /// Share of the pressure that comes back from the interface to `other`; squared it is the share of the intensity.
+    /// Share of the pressure that comes back from the interface to `other`; squared it is the share
+    /// of the intensity.
     pub(crate) fn pressure_reflection(&self, other: &Medium) -> f32 {
         (other.impedance - self.impedance) / (other.impedance + self.impedance)
     }
 
-    /// Share of the intensity that comes back from the interface to `other`: `((Z₂ − Z₁)/(Z₂ + Z₁))²`.
+    /// Share of the intensity that comes back from the interface to `other`: `((Z₂ − Z₁)/(Z₂ +
+    /// Z₁))²`.
     pub fn reflection(&self, other: &Medium) -> f32 {
         self.pressure_reflection(other).powi(2)
     }

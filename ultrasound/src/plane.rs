@@ -12,8 +12,9 @@ pub struct Mesh<'a> {
     pub triangles: &'a [[u32; 3]],
     /// The medium behind it: under the surface of a layer, inside a vessel.
     pub behind: Medium,
-    /// A closed surface: the second crossing leads out of it again, into the last of those that it is in, of which 64 are told apart. It is a
-    /// wall as thick as this, mm; 0 is a surface without one.
+    /// A closed surface: the second crossing leads out of it again, into the last of those that it
+    /// is in, of which 64 are distinguished. It is a wall as thick as this, mm; 0 is a surface
+    /// without one.
     pub wall_mm: Option<f32>,
 }
 
@@ -28,7 +29,8 @@ pub(crate) struct Crossing {
     pub(crate) facing: f32,
 }
 
-/// Cuts `meshes` at `elevation` mm beside the image's plane: for each of `lines`, its crossings from the skin down.
+/// Cuts `meshes` at `elevation` mm beside the image's plane: for each of `lines`, its crossings
+/// from the skin down.
 pub(crate) fn cut(axes: &Axes, elevation: f32, width: f32, meshes: &[Mesh<'_>], lines: &mut [Vec<Crossing>]) {
     lines.iter_mut().for_each(Vec::clear);
     for (number, mesh) in meshes.iter().enumerate() {
@@ -60,7 +62,8 @@ fn corners(points: &[[f32; 4]], triangle: &[u32; 3]) -> Option<[Vector; 3]> {
     Some(corners)
 }
 
-/// The part of a triangle (in the probe's own axes) that lies in the plane: two places (lateral, axial).
+/// The part of a triangle (in the probe's own axes) that lies in the plane: two places (lateral,
+/// axial).
 fn section(p: Vector, q: Vector, r: Vector) -> Option<([f32; 2], [f32; 2])> {
     let mut ends = [[0.0; 2]; 2];
     let mut found = 0;

@@ -115,8 +115,8 @@ impl Probe {
         [axes.lateral, axes.axial, axes.elevation]
     }
 
-    /// Half the beam's thickness at a depth as the standard deviation of a Gaussian, mm: thinnest at the focus, and wider away
-    /// from it as a Gaussian beam of the wavelength is.
+    /// Half the beam's thickness at a depth as the standard deviation of a Gaussian, mm: thinnest
+    /// at the focus, and wider away from it as a Gaussian beam of the wavelength is.
     pub(crate) fn beam_sigma_mm(&self, depth_mm: f32) -> f32 {
         let sigma = self.thickness_mm / FWHM;
         let wavelength = 1.54 / self.mhz;

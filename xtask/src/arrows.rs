@@ -1,9 +1,12 @@
-//! The arrow check: no files of a crate use each other in a circle, and no function is longer than 60 lines.
+//! The arrow check: no files of a crate use each other in a circle, no function is longer than 60
+//! lines, and files are included by `#[path]` where that has a reason only.
 //!
-//! A file uses another if its code, tests aside, names something that the other defines. A name that a module only hands on
-//! (`pub use`) belongs to the file that defines it. A module and the modules that it is made of are one house: what it uses of
-//! them is no arrow, what they use of it is one.
+//! A file uses another if its code, tests aside, names something that the other defines. A name
+//! that a module only hands on (`pub use`) belongs to the file that defines it. A module and the
+//! modules that it is made of are one house: what it uses of them is no arrow, what they use of it
+//! is one.
 
+mod included;
 mod krate;
 mod lengths;
 mod source;
@@ -41,17 +44,19 @@ pub(crate) fn check() -> Result<(), Error> {
             long.extend(lengths::too_long(&text).into_iter().map(one));
         }
     }
-    circles.iter().chain(&long).for_each(|one| eprintln!("{one}"));
+    let included = included::unlisted(&shell::top()).map_err(unreadable)?;
+    circles.iter().chain(&long).chain(&included).for_each(|one| eprintln!("{one}"));
     if count < FEWEST_USES {
         return Err(Error::new(format!("only {count} uses were seen: the reader of sources is blind")));
     }
-    if circles.is_empty() && long.is_empty() {
+    if circles.is_empty() && long.is_empty() && included.is_empty() {
         return Ok(());
     }
     Err(Error::new(format!(
-        "{} circles, each printed above: move what both files need into a file below them; {} functions that are too long",
+        "{} circles, each printed above: move what both files need into a file below them; {} functions that are too long; {} includes",
         circles.len(),
-        long.len()
+        long.len(),
+        included.len()
     )))
 }
 

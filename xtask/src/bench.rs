@@ -1,8 +1,9 @@
-//! `cargo xtask bench`: runs the measuring programs there are and puts what they print into one table. A program gives a
-//! row by printing `name=value`, with a name of [`crate::rows`], or as JSON, `"row": "name", … "value": …`; a peer beside it
-//! by `name.peer=who name.peer_value=…`; the time of an amount of work by `work.subject.unit.amount=seconds`. A row that nothing
-//! measures is left out, and a peer that is not there is named: no number here was written by hand. Lines that a test of the
-//! emulated board begins with a bar are printed below the table as they are.
+//! `cargo xtask bench`: runs the measuring programs there are and puts what they print into one
+//! table. A program gives a row by printing `name=value`, with a name of [`crate::rows`], or as
+//! JSON, `"row": "name", … "value": …`; a peer beside it by `name.peer=who name.peer_value=…`; the
+//! time of an amount of work by `work.subject.unit.amount=seconds`. A row that nothing measures is
+//! left out, and a peer that is not there is named: no number here was written by hand. Lines that
+//! a test of the emulated board begins with a bar are printed below the table as they are.
 
 mod fit;
 mod programs;
@@ -19,7 +20,8 @@ use std::process::{Command, Stdio};
 use table::Measured;
 use values::{Values, peer};
 
-/// Measures, prints the tables, writes `target/bench.json`. Where `names` has any, only what gives these rows is run.
+/// Measures, prints the tables, writes `target/bench.json`. Where `names` has any, only what gives
+/// these rows is run.
 pub(crate) fn run(names: &[String]) -> Result<(), Error> {
     if let Some(unknown) = names.iter().find(|name| ROWS.iter().all(|row| row.name != **name)) {
         let all: Vec<&str> = ROWS.iter().map(|row| row.name).collect();

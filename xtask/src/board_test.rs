@@ -1,4 +1,5 @@
-//! `cargo xtask board-test`: the tests of `firmware/tests/board.rs` on a real board, or the plain word that they did not run.
+//! `cargo xtask board-test`: the tests of `firmware/tests/board.rs` on a real board, or the plain
+//! word that they did not run.
 
 use crate::boards::Board;
 use crate::shell::{self, Error};
@@ -15,7 +16,8 @@ pub(crate) fn run(board: &Board) -> Result<(), Error> {
         );
         return Ok(());
     }
-    // The runner, probe-rs, flashes and resets for each test; the one in .cargo/config.toml is for the default board.
+    // The runner, probe-rs, flashes and resets for each test; the one in .cargo/config.toml is for
+    // the default board.
     let runner = format!("probe-rs run --chip {}", board.chip);
     let mut tests = command("test", board, &["--", "--test-threads", "1"]);
     shell::run(tests.env("CARGO_TARGET_THUMBV7EM_NONE_EABIHF_RUNNER", runner))

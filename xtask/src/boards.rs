@@ -1,4 +1,5 @@
-//! The boards that there are images for: what the chores have to know of each. Its pins are in `firmware/src/board`.
+//! The boards that there are images for: what the chores have to know of each. Its pins are in
+//! `firmware/src/board`.
 
 use crate::shell::Error;
 use std::ops::Range;

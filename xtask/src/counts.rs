@@ -1,5 +1,6 @@
-//! `cargo xtask counts`: the instructions of hot paths, counted by callgrind, against those of `xtask/instruction-counts.txt`.
-//! A count depends on the compiler and hardly on the machine, so that it shows what a time on a busy machine hides.
+//! `cargo xtask counts`: the instructions of hot paths, counted by callgrind, against those of
+//! `xtask/instruction-counts.txt`. A count depends on the compiler and hardly on the machine, so
+//! that it shows what a time on a busy machine hides.
 
 mod shares;
 
@@ -11,7 +12,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// A hot path: its name for the example `hot_paths`, what is counted, and the function in which counting is on.
+/// A hot path: its name for the example `hot_paths`, what is counted, and the function in which
+/// counting is on.
 struct HotPath {
     name: &'static str,
     what: &'static str,
@@ -108,7 +110,8 @@ fn counted() -> Result<Counts, Error> {
     Ok(counts)
 }
 
-/// The files of whose code each path spends its instructions; of the diagnosis all of it, and not the filter alone.
+/// The files of whose code each path spends its instructions; of the diagnosis all of it, and not
+/// the filter alone.
 fn print_shares() -> Result<(), Error> {
     valgrind()?;
     let program = with_lines()?;
@@ -127,7 +130,8 @@ fn print_shares() -> Result<(), Error> {
     Ok(())
 }
 
-/// Runs a path under callgrind, counting in one function or all over; the profile, and what the program printed.
+/// Runs a path under callgrind, counting in one function or all over; the profile, and what the
+/// program printed.
 fn profiled(program: &Path, arguments: &[&str], function: Option<&str>) -> Result<(PathBuf, String), Error> {
     let profile = shell::target().join(format!("callgrind.{}", arguments.join("-")));
     let mut valgrind = Command::new("valgrind");
@@ -165,7 +169,8 @@ fn total(profile: &str) -> Option<f64> {
     profile.lines().find_map(|line| line.strip_prefix("totals:")?.trim().parse().ok())
 }
 
-/// Calls of a function in a profile, which names it once, as `cfn=(12) name`, and then by its number.
+/// Calls of a function in a profile, which names it once, as `cfn=(12) name`, and then by its
+/// number.
 fn calls(profile: &str, function: &str) -> f64 {
     let named = |line: &str| Some(line.split_once('(')?.1.split_once(") ")?.1.starts_with(function));
     let id = |line: &str| Some(line.split_once('(')?.1.split_once(')')?.0.to_string());

@@ -1,4 +1,5 @@
-//! ST's DfuSe file (UM0391): an image with its address, which the bootloader's tools take without further words.
+//! ST's DfuSe file (UM0391): an image with its address, which the bootloader's tools take without
+//! further words.
 
 /// The bootloader that the microcontroller has in ROM: its vendor and product on USB.
 const VENDOR: u16 = 0x0483;
@@ -6,7 +7,8 @@ const PRODUCT: u16 = 0xDF11;
 /// The version of the DFU file format that ST's extension has (UM0391, DFU suffix).
 const FORMAT: u16 = 0x011A;
 
-/// Returns a file with one image, of `bytes` from the address `start` on, for a target of this name.
+/// Returns a file with one image, of `bytes` from the address `start` on, for a target of this
+/// name.
 pub(crate) fn file(name: &str, start: u32, bytes: &[u8]) -> Vec<u8> {
     let element_bytes = 8 + bytes.len();
     let target_bytes = 274 + element_bytes;
@@ -16,7 +18,8 @@ pub(crate) fn file(name: &str, start: u32, bytes: &[u8]) -> Vec<u8> {
     file.push(1);
     file.extend(((11 + target_bytes) as u32).to_le_bytes());
     file.push(1);
-    // Target: signature, alternate setting 0 (the internal flash), a name of 255 bytes, size, one element.
+    // Target: signature, alternate setting 0 (the internal flash), a name of 255 bytes, size, one
+    // element.
     file.extend(b"Target");
     file.push(0);
     file.extend(1_u32.to_le_bytes());
@@ -29,7 +32,8 @@ pub(crate) fn file(name: &str, start: u32, bytes: &[u8]) -> Vec<u8> {
     file.extend(start.to_le_bytes());
     file.extend((bytes.len() as u32).to_le_bytes());
     file.extend(bytes);
-    // Suffix: device version (any), product, vendor, format, signature, its length, checksum of all before.
+    // Suffix: device version (any), product, vendor, format, signature, its length, checksum of all
+    // before.
     for number in [0xFFFF, PRODUCT, VENDOR, FORMAT] {
         file.extend(number.to_le_bytes());
     }
@@ -61,7 +65,8 @@ mod tests {
         assert_eq!(crc(b"123456789"), 0x340B_C6D9);
     }
 
-    /// Written and read by different hands: the page checks prefix, target, element and suffix by their place in UM0391.
+    /// Written and read by different hands: the page checks prefix, target, element and suffix by
+    /// their place in UM0391.
     #[test]
     fn the_page_of_a_board_reads_the_file() {
         let bytes: Vec<u8> = (0..5_000_u32).map(|n| ((n * 7) >> 3) as u8).collect();

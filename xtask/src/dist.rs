@@ -1,4 +1,5 @@
-//! Makes what a lab downloads: both boards' images, a program for the PC and a Python package, each with the commit it was built from.
+//! Makes what a lab downloads: both boards' images, a program for the PC and a Python package, each
+//! with the commit it was built from.
 
 use crate::boards::{self, Board};
 use crate::elf::Elf;

@@ -129,7 +129,7 @@ impl Elf {
         Ok(String::from_utf8_lossy(text).into_owned())
     }
 
-    /// The image as it lies in flash, from its first byte to its last; gaps are as erased flash.
+    /// The image as it is in flash, from its first byte to its last; gaps are as erased flash.
     pub(crate) fn flash_image(&self) -> Result<(u32, Vec<u8>), Error> {
         let segments: Vec<Segment> =
             self.segments()?.into_iter().filter(|segment| segment.file_size > 0).collect();

@@ -57,7 +57,8 @@ fn moved(from: &Path, to: &Path) -> Result<(), Error> {
     })
 }
 
-/// Prints path, flash, RAM and worst stack use; refuses an image that is too large or whose stack may not suffice.
+/// Prints path, flash, RAM and worst stack use; refuses an image that is too large or whose stack
+/// may not suffice.
 pub(crate) fn report(board: &Board, path: &Path) -> Result<(), Error> {
     let elf = Elf::read(path)?;
     let (_, image) = elf.flash_image()?;

@@ -1,4 +1,5 @@
-//! Flashes a board: through its debug probe, or over USB with the bootloader that every STM32F407 has in ROM.
+//! Flashes a board: through its debug probe, or over USB with the bootloader that every STM32F407
+//! has in ROM.
 
 use crate::boards::{self, Board};
 use crate::elf::Elf;

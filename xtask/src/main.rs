@@ -1,8 +1,10 @@
-//! The project's chores, one subcommand each; `cargo xtask help` lists them. CI runs `cargo xtask test` and nothing else, and
-//! each of its steps is runnable by hand under its own name.
+//! The project's chores, one subcommand each; `cargo xtask help` lists them. CI runs `cargo xtask
+//! test` and nothing else, and each of its steps is runnable by hand under its own name.
 //!
-//! Built before everything else, hence no dependencies; it knows which commands to run, and nothing of the crates' insides.
+//! Built before everything else, hence no dependencies; it knows which commands to run, and nothing
+//! of the crates' insides.
 
+mod answers;
 mod arrows;
 mod bench;
 mod board_test;
@@ -39,7 +41,7 @@ The project's chores.
                                 prove
   cargo xtask test --quick      the inner loop: format, words, arrows, warnings, the tests inside the crates; three minutes
   cargo xtask nightly [WHAT…]   what takes longer than the tests may: slow parquet foxglove class counts soak
-                                mutants proof
+                                answers mutants proof
   cargo xtask firmware          builds the flash image; prints its path, flash, RAM and worst stack use
   cargo xtask flash [--dfu]     flashes it with probe-rs; --dfu: over USB, without a probe
                                 both, and board-test, take --board: discovery (default), nucleo-f429zi
@@ -51,6 +53,8 @@ The project's chores.
   cargo xtask bench [ROW…]      measures, prints the table and writes target/bench.json
   cargo xtask counts            the instructions of hot paths against those written down; --renew writes them down,
                                 --shares prints the source files in which they are spent
+  cargo xtask answers           the diagnoses of 100 drawn recordings by this commit and by an earlier one, compared to the digit;
+                                --against PROGRAM|REVISION; without it the commit of a day ago; other flags as `prove` has them
   cargo xtask mutants [CRATE…]  changes the code a thousand times and sees that the tests notice: half an hour
   cargo xtask prove [FLAGS…]    the blinded proof of the diagnosis; flags as `cargo xtask prove --help` says
   cargo xtask help              this text
@@ -77,6 +81,7 @@ fn main() -> ExitCode {
         "nightly" => test::nightly(rest),
         "board-test" => for_board(rest, board_test::run),
         "wiring" => no_more(rest).and_then(|()| wiring::run()),
+        "answers" => answers::run(rest),
         "mutants" => mutants::run(rest),
         "bench" => bench::run(rest),
         "counts" => counts::run(rest),

@@ -1,5 +1,6 @@
-//! `cargo xtask mutants`: changes the code a thousand times in small ways and sees that the tests notice. By hand, for it takes
-//! about half an hour; what may survive, and why, stands in `tests/mutants.md`.
+//! `cargo xtask mutants`: changes the code a thousand times in small ways and sees that the tests
+//! notice. By hand, for it takes about half an hour; what may survive, and why, is in
+//! `tests/mutants.md`.
 
 use crate::shell::{self, Error, cargo};
 use std::fs;

@@ -31,7 +31,8 @@ const fn peered(row: Row, peer: &'static str) -> Row {
     Row { peer: Some(peer), ..row }
 }
 
-/// Every row that there is, in the table's order. A measuring program gives a value by printing `name=value`.
+/// Every row that there is, in the table's order. A measuring program gives a value by printing
+/// `name=value`.
 pub(crate) const ROWS: [Row; 25] = [
     row("tick_instructions_longest", "instructions", Some(840.0), Better::Lower),
     row("tick_to_dac_spread_us", "us", Some(1.0), Better::Lower),

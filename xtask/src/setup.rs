@@ -1,4 +1,5 @@
-//! The programs that a machine needs beyond Rust: named, then installed where that is allowed, else the one command that does it.
+//! The programs that a machine needs beyond Rust: named, then installed where that is allowed, else
+//! the one command that does it.
 
 use crate::shell::{self, Error};
 use std::fs;
@@ -17,8 +18,8 @@ fn is_root() -> bool {
         .unwrap_or(false)
 }
 
-/// Fails where the disk that cargo builds on has less than `needed_mib` left beside what the target folder holds already. A machine
-/// without `df` passes.
+/// Fails where the disk that cargo builds on has less than `needed_mib` left beside what the target
+/// folder holds already. A machine without `df` passes.
 pub(crate) fn disk(needed_mib: u64) -> Result<(), Error> {
     let target = shell::target();
     let folder = if target.is_dir() { target.clone() } else { shell::top() };
@@ -65,7 +66,8 @@ pub(crate) fn browser() -> Result<(), Error> {
     install(&["chromium"], "the browser test")
 }
 
-/// A Python of our own in `target/`, with exactly these packages (`name==version`) beside what it already has; its interpreter.
+/// A Python of our own in `target/`, with exactly these packages (`name==version`) beside what it
+/// already has; its interpreter.
 pub(crate) fn python(packages: &[&str]) -> Result<PathBuf, Error> {
     let folder = shell::target().join("python");
     let interpreter = folder.join("bin/python");
@@ -93,7 +95,8 @@ pub(crate) fn python(packages: &[&str]) -> Result<PathBuf, Error> {
     Ok(interpreter)
 }
 
-/// Packages for node in `target/node`, exactly these (`name@version`) and what they need; the folder for `NODE_PATH`.
+/// Packages for node in `target/node`, exactly these (`name@version`) and what they need; the
+/// folder for `NODE_PATH`.
 pub(crate) fn node_packages(packages: &[&str]) -> Result<PathBuf, Error> {
     node()?;
     let folder = shell::target().join("node");
@@ -124,7 +127,8 @@ pub(crate) fn node() -> Result<(), Error> {
     }
 }
 
-/// Makes sure of Mono, which compiles and runs C#: Debian has it, and no registry that CI reaches has .NET.
+/// Makes sure of Mono, which compiles and runs C#: Debian has it, and no registry that CI reaches
+/// has .NET.
 pub(crate) fn mono() -> Result<(), Error> {
     if ["mcs", "mono"].into_iter().all(shell::is_on_path) {
         return Ok(());
@@ -145,13 +149,14 @@ pub(crate) enum Toolchain {
 
 /// The board's target.
 pub(crate) const TARGET: &str = "thumbv7em-none-eabihf";
-/// Debian's compiler, cargo, sources of the core library, and the names under which the compiler finds its linker; all
-/// newer than its release.
+/// Debian's compiler, cargo, sources of the core library, and the names under which the compiler
+/// finds its linker; all newer than its release.
 const DEBIAN_PACKAGES: [&str; 4] = ["rustc-web", "cargo-web", "rust-web-src", "rust-web-llvm"];
 /// The linker for the board, a link to the package of its version.
 const DEBIAN_LINKER: &str = "/usr/bin/rust-lld";
 
-/// Finds a way to build for the board: the target at hand, else added by rustup, else Debian's compiler.
+/// Finds a way to build for the board: the target at hand, else added by rustup, else Debian's
+/// compiler.
 pub(crate) fn toolchain() -> Result<Toolchain, Error> {
     toolchain_for(TARGET, "the image for the board")
 }
@@ -204,7 +209,8 @@ pub(crate) fn cargo_with(toolchain: Toolchain, subcommand: &str, library: &str) 
         Toolchain::Debian => {
             let mut cargo = Command::new("/usr/bin/cargo");
             cargo.current_dir(shell::top());
-            // `-Z` on a stable compiler: only the library is built with it, from the compiler's own sources.
+            // `-Z` on a stable compiler: only the library is built with it, from the compiler's own
+            // sources.
             cargo.env("RUSTC", "/usr/bin/rustc").env("RUSTC_BOOTSTRAP", "1").env_remove("RUSTUP_TOOLCHAIN");
             cargo.arg(subcommand).arg(format!("-Zbuild-std={library}"));
             cargo

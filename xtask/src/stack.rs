@@ -1,9 +1,10 @@
-//! The worst stack use, read from the image itself: what each function's instructions take from the stack, who calls whom,
-//! and which interrupts may nest. A bound, not a measurement: every branch counts as taken.
+//! The worst stack use, read from the image itself: what each function's instructions take from the
+//! stack, who calls whom, and which interrupts may nest. A bound, not a measurement: every branch
+//! counts as taken.
 //!
-//! A call through a pointer counts as a call of any function whose address the image holds. Where calls may come round in
-//! a circle, each function of it counts once; the image has such circles only through pointers, where no real call takes
-//! them.
+//! A call through a pointer counts as a call of any function whose address the image holds. Where
+//! calls may come round in a circle, each function of it counts once; the image has such circles
+//! only through pointers, where no real call takes them.
 
 mod thumb;
 
@@ -13,7 +14,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use thumb::{Body, Code};
 
-/// The bytes that the core puts on the stack for an interrupt, floating-point registers and alignment included.
+/// The bytes that the core puts on the stack for an interrupt, floating-point registers and
+/// alignment included.
 const EXCEPTION_FRAME: u32 = 108;
 /// Entries of the vector table before the interrupts: stack pointer, reset, faults, SysTick.
 const EXCEPTIONS: usize = 16;
@@ -157,7 +159,8 @@ impl Graph {
         for &node in edges.keys() {
             search.visit(node);
         }
-        // Circles come out callees first: every callee's depth is known when its caller's turn comes.
+        // Circles come out callees first: every callee's depth is known when its caller's turn
+        // comes.
         let mut circle_of = BTreeMap::new();
         for (number, circle) in search.circles.iter().enumerate() {
             circle_of.extend(circle.iter().map(|&node| (node, number)));

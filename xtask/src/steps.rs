@@ -4,7 +4,7 @@ use crate::boards::{self, Board};
 use crate::setup::{self, Toolchain};
 use crate::shell::{self, Error, cargo};
 use crate::workspace_build::{ANY_RUST, BUILD, built};
-use crate::{arrows, board_test, counts, firmware, mutants, python, site, wasm, words};
+use crate::{answers, arrows, board_test, counts, firmware, mutants, python, site, wasm, words};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -16,7 +16,8 @@ const LONG_FUZZ_SECONDS: &str = "600";
 pub(crate) struct Step {
     pub(crate) name: &'static str,
     pub(crate) shows: &'static str,
-    /// The longest that it may take on two idle cores, in s. A slower machine gets a remark and does not fail.
+    /// The longest that it may take on two idle cores, in s. A slower machine gets a remark and
+    /// does not fail.
     pub(crate) bound_s: f64,
     pub(crate) run: fn() -> Result<(), Error>,
 }
@@ -59,7 +60,7 @@ pub(crate) const QUICK: [Step; 5] = [
 ];
 
 /// The checks that take longer than the tests may.
-pub(crate) const NIGHTLY: [Step; 8] = [
+pub(crate) const NIGHTLY: [Step; 9] = [
     step("slow", "the tests that take longest, marked `nightly`", 600.0, slow),
     step(
         "parquet",
@@ -71,6 +72,12 @@ pub(crate) const NIGHTLY: [Step; 8] = [
     step("class", "devices and their instructor over Zenoh, and thirty devices measured", 900.0, class),
     step("counts", "hot paths take no more instructions than were written down", 120.0, counts::check),
     step("soak", "the frame parser, ten minutes of damaged frames", 620.0, soak),
+    step(
+        "answers",
+        "the diagnoses of 100 recordings are those of a day ago, to the digit",
+        1500.0,
+        answers::nightly,
+    ),
     step("mutants", "the tests notice a thousand small changes of the code", 2400.0, mutated),
     step("proof", "the whole proof of the diagnosis", 7200.0, whole_proof),
 ];
@@ -158,8 +165,8 @@ fn board() -> Result<(), Error> {
     shell::run(tests.args(["--test", "board"]))
 }
 
-/// Checks a page for accessibility (MPL 2.0), and emulates a headset (MIT), each at the version that the page was checked with. They are
-/// used by the tests only and are no part of any product.
+/// Checks a page for accessibility (MPL 2.0), and emulates a headset (MIT), each at the version
+/// that the page was checked with. They are used by the tests only and are no part of any product.
 const IN_PAGES: [&str; 2] = ["axe-core@4.14.1", "iwer@2.5.0"];
 
 fn browser() -> Result<(), Error> {
@@ -267,8 +274,8 @@ fn class() -> Result<(), Error> {
     shell::run(&mut test)
 }
 
-/// Foxglove's client, the socket it needs, and what reads the schema of its transforms; each at the version that the check was
-/// written against.
+/// Foxglove's client, the socket it needs, and what reads the schema of its transforms; each at the
+/// version that the check was written against.
 const FOXGLOVE_CLIENT: [&str; 3] = ["@foxglove/ws-protocol@0.8.0", "ws@8.23.0", "protobufjs@8.8.1"];
 
 /// Foxglove's live stream read by Foxglove's own client; needs a build of its own.

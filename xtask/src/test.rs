@@ -1,12 +1,13 @@
-//! `cargo xtask test`: everything that passes or fails, set-up included, each step also by its own name; and
-//! `cargo xtask nightly`, the checks that take longer than the tests may.
+//! `cargo xtask test`: everything that passes or fails, set-up included, each step also by its own
+//! name; and `cargo xtask nightly`, the checks that take longer than the tests may.
 
 use crate::setup;
 use crate::shell::Error;
 use crate::steps::{NIGHTLY, QUICK, STEPS, Step};
 use std::time::Instant;
 
-/// The space that a whole run writes into an empty target folder, and room to spare; a linker on a full disk dies of a bus error.
+/// The space that a whole run writes into an empty target folder, and room to spare; a linker on a
+/// full disk dies of a bus error.
 const NEEDED_MIB: u64 = 7 * 1024;
 /// As much where most is built already.
 const NEEDED_BY_A_STEP_MIB: u64 = 1024;

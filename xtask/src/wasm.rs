@@ -1,5 +1,6 @@
-//! `cargo xtask wasm`: builds what the page computes in the browser and puts it beside the page's files, with a note of which
-//! sources it is from. `cargo xtask test wasm` checks that it is theirs.
+//! `cargo xtask wasm`: builds what the page computes in the browser and puts it beside the page's
+//! files, with a note of which sources it is from. `cargo xtask test wasm` checks that it is
+//! theirs.
 
 use crate::setup;
 use crate::shell::{self, Error};
@@ -38,7 +39,8 @@ pub(crate) fn run() -> Result<(), Error> {
     Ok(())
 }
 
-/// Checks that the product is built from the sources: by its note everywhere, byte for byte where the same compiler is at hand.
+/// Checks that the product is built from the sources: by its note everywhere, byte for byte where
+/// the same compiler is at hand.
 ///
 /// Returns what was checked.
 pub(crate) fn check() -> Result<&'static str, Error> {

@@ -1,6 +1,8 @@
-//! Draws each board's wiring from the pin table in `docs/hardware.md`: what the table says is what the picture shows.
+//! Draws each board's wiring from the pin table in `docs/hardware.md`: what the table says is what
+//! the picture shows.
 //!
-//! `tests/tests/board/wiring.rs` compares the same table with the pins that the emulated board drives, and so with the image.
+//! `tests/tests/board/wiring.rs` compares the same table with the pins that the emulated board
+//! drives, and so with the image.
 
 use crate::shell::{self, Error};
 use std::fmt::Write as _;
@@ -14,7 +16,8 @@ const PICTURES: [(&str, &str, &str); 2] = [
     ("## The second board: NUCLEO-F429ZI", "NUCLEO-F429ZI", "docs/wiring-nucleo-f429zi.svg"),
 ];
 
-/// Pixels of the picture: its width, a row's height, the board's left and right edge, where the words begin.
+/// Pixels of the picture: its width, a row's height, the board's left and right edge, where the
+/// words begin.
 const WIDTH: usize = 1000;
 const ROW: usize = 44;
 const BOARD: (usize, usize) = (20, 330);
@@ -56,7 +59,8 @@ struct Row {
     words: String,
 }
 
-/// Returns the rows of the first table under `section`: pins, connector and words, or pins, words and a remark.
+/// Returns the rows of the first table under `section`: pins, connector and words, or pins, words
+/// and a remark.
 fn table(text: &str, section: &str) -> Vec<Row> {
     let Some((_, after)) = text.split_once(section) else { return Vec::new() };
     let lines =

@@ -1,7 +1,9 @@
-//! The word check: phrases that `words/list.rs` replaces by plain ones, doc comments that open like a question, and long names of tests.
+//! The word check: phrases that `words/list.rs` replaces by plain ones, doc comments that open like
+//! a question, long names of tests and wide comments.
 //!
-//! Comments and string literals of Rust are read, and the whole text of Markdown, HTML, CSS, JavaScript, Python and TOML. A phrase is
-//! found in any case and across a line break, and never across punctuation.
+//! Comments and string literals of Rust are read, and the whole text of Markdown, HTML, CSS,
+//! JavaScript, Python and TOML. A phrase is found in any case and across a line break, and never
+//! across punctuation.
 
 mod list;
 mod prose;
@@ -19,6 +21,8 @@ use std::path::Path;
 const SKIPPED: [&str; 4] = ["target", ".git", ".venv", "node_modules"];
 /// The longest name of a test, in characters.
 const LONGEST_NAME: usize = 60;
+/// The widest comment in Rust, in columns.
+const WIDEST_COMMENT: usize = 100;
 /// The list names what it bans.
 const LIST: &str = "xtask/src/words/list.rs";
 
@@ -37,7 +41,8 @@ pub(crate) fn check() -> Result<(), Error> {
     )))
 }
 
-/// Appends the findings in every file below `folder`, whose path from the top of the repository is `path`.
+/// Appends the findings in every file below `folder`, whose path from the top of the repository is
+/// `path`.
 fn visit(folder: &Path, path: &str, findings: &mut Vec<String>) -> io::Result<()> {
     let mut entries = fs::read_dir(folder)?.collect::<io::Result<Vec<_>>>()?;
     entries.sort_by_key(fs::DirEntry::file_name);
@@ -56,6 +61,11 @@ fn visit(folder: &Path, path: &str, findings: &mut Vec<String>) -> io::Result<()
                 findings.extend(long_names(&text).into_iter().map(|(line, name)| {
                     format!("{below}:{line}: {name}: say what holds in at most {LONGEST_NAME} characters")
                 }));
+                findings.extend(
+                    wide(&text)
+                        .into_iter()
+                        .map(|line| format!("{below}:{line}: wrap this comment at {WIDEST_COMMENT} columns")),
+                );
             }
             if [".rs", ".js"].iter().any(|end| name.ends_with(end)) {
                 findings.extend(openings(&text).into_iter().map(|(line, word)| {
@@ -95,7 +105,8 @@ fn phrases<'a>(words: &[Word], list: &'a [Phrase]) -> Vec<Found<'a>> {
     for (at, first) in words.iter().enumerate() {
         for (rest, phrase) in by_first.get(first.text.as_str()).into_iter().flatten() {
             let follows = words[at + 1..].iter().take(rest.len()).filter(|word| word.follows);
-            if follows.map(|word| word.text.as_str()).eq(rest.iter().copied()) {
+            let same = follows.zip(rest).filter(|(word, banned)| is_same(&word.text, banned));
+            if same.count() == rest.len() {
                 found.push(Found { line: first.line, phrase });
             }
         }
@@ -103,7 +114,24 @@ fn phrases<'a>(words: &[Word], list: &'a [Phrase]) -> Vec<Found<'a>> {
     found
 }
 
-/// Returns the lines of Rust in `text` with the name of a test that is too long, each with the name.
+/// True if a word is the one of a phrase; `*'s` is any word that ends in 's.
+fn is_same(word: &str, banned: &str) -> bool {
+    word == banned || banned == "*'s" && ["'s", "’s"].iter().any(|end| word.ends_with(end))
+}
+
+/// Returns the lines of Rust in `text` that hold nothing but a comment and are too long. A row of a
+/// table is as long as it is.
+fn wide(text: &str) -> Vec<usize> {
+    let is_wide = |line: &str| {
+        let comment = line.trim_start();
+        let is_row = comment.trim_start_matches(['/', '!']).starts_with(" | ") && comment.ends_with('|');
+        comment.starts_with("//") && !is_row && line.chars().count() > WIDEST_COMMENT
+    };
+    text.lines().enumerate().filter(|(_, line)| is_wide(line)).map(|(number, _)| number + 1).collect()
+}
+
+/// Returns the lines of Rust in `text` with the name of a test that is too long, each with the
+/// name.
 fn long_names(text: &str) -> Vec<(usize, &str)> {
     let mut found = Vec::new();
     let mut is_test = false;
@@ -120,7 +148,8 @@ fn long_names(text: &str) -> Vec<(usize, &str)> {
     found
 }
 
-/// Returns the lines of Rust or JavaScript in `text` that begin a doc comment with a word of [`OPENINGS`], each with the word.
+/// Returns the lines of Rust or JavaScript in `text` that begin a doc comment with a word of
+/// [`OPENINGS`], each with the word.
 fn openings(text: &str) -> Vec<(usize, &'static str)> {
     let mut found = Vec::new();
     let mut is_inside = false;
@@ -192,6 +221,25 @@ mod tests {
         assert_eq!(openings(text), [(1, "What"), (6, "Whether")]);
         assert_eq!(openings("/** What it is. */\n  /** How it is. */"), [(1, "What"), (2, "How")]);
         assert_eq!(openings("// What is it?\n/// Whatever it is, it is returned."), []);
+    }
+
+    #[test]
+    fn one_phrase_covers_every_owner() {
+        let list = [Phrase { banned: "quite *'s", plain: "of", why: "shorter" }];
+        let words = prose::reader("a.md").expect("a kind of file with prose");
+        let lines =
+            |text: &str| phrases(&words(text), &list).iter().map(|found| found.line).collect::<Vec<_>>();
+        assert_eq!(lines("It is quite one's.\nIt is quite another’s.\nIt is quite one."), [1, 2]);
+    }
+
+    #[test]
+    fn a_comment_has_at_most_a_hundred_columns() {
+        let (fits, wide_one) = (format!("// {}", "a".repeat(97)), format!("    /// {}", "b".repeat(93)));
+        let row = format!("//! | {} |", "c".repeat(100));
+        assert_eq!(
+            wide(&format!("{fits}\n{wide_one}\n{row}\nlet long = \"{}\"; // d", "d".repeat(100))),
+            [2]
+        );
     }
 
     #[test]

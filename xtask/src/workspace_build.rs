@@ -1,5 +1,5 @@
-//! The one build of everything for the PC, as one selection of packages: another selection is another set of features, and builds
-//! most of them once more.
+//! The one build of everything for the PC, as one selection of packages: another selection is
+//! another set of features, and builds most of them once more.
 
 use crate::shell::{self, Error, cargo};
 use std::path::PathBuf;
@@ -9,7 +9,8 @@ pub(crate) const ANY_RUST: &str = "--ignore-rust-version";
 /// The selection of packages and the profile.
 pub(crate) const BUILD: [&str; 3] = ["--release", "--workspace", ANY_RUST];
 
-/// Builds a program of the one build; where it lies below the build's folder.
+/// Builds a program of the one build and returns its path; `below` is its place in the build's
+/// folder.
 pub(crate) fn built(which: &[&str], below: &str) -> Result<PathBuf, Error> {
     shell::run(cargo().args(["build", "--quiet"]).args(BUILD).args(which))?;
     Ok(shell::target().join("release").join(below))

@@ -1,4 +1,5 @@
-//! ST's DfuSe file (UM0391), as `cargo xtask dist` writes it: one image with its address, under a checksum.
+//! ST's DfuSe file (UM0391), as `cargo xtask dist` writes it: one image with its address, under a
+//! checksum.
 
 use device_sim::error::Error;
 

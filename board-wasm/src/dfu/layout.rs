@@ -45,7 +45,8 @@ impl Layout {
         if sectors.is_empty() { Err(refuse()) } else { Ok(Self { sectors }) }
     }
 
-    /// Returns the addresses of the sectors that an image lies in, which are erased for it: no other is touched.
+    /// Returns the addresses of the sectors that hold an image, which are erased for it: no other
+    /// is touched.
     pub fn sectors_of(&self, image: &Image) -> Result<Vec<u32>, Error> {
         let start = u64::from(image.start);
         let end = start + image.bytes.len() as u64;

@@ -1,5 +1,6 @@
-//! The update over USB with the bootloader that the microcontroller has in ROM: USB DFU 1.1 with ST's extension, as AN3156 has it. The
-//! page carries the transfers out; which comes next is decided here.
+//! The update over USB with the bootloader that the microcontroller has in ROM: USB DFU 1.1 with
+//! ST's extension, as AN3156 has it. The page carries the transfers out; which comes next is
+//! decided here.
 
 pub mod file;
 pub mod layout;
@@ -16,8 +17,8 @@ use std::task::{Context, Poll, Waker};
 
 /// Bytes of a block (AN3156: 2 to 2,048).
 pub const BLOCK: usize = 2_048;
-/// The first block of data. A block's place is the address and its number past this one times *its own* length (AN3156 4.1, 5.1), so that
-/// all blocks have to be as long as each other.
+/// The first block of data. A block's place is the address and its number past this one times *its
+/// own* length (AN3156 4.1, 5.1), so that all blocks have to be as long as each other.
 const FIRST_BLOCK: u16 = 2;
 /// Requests (USB DFU 1.1, table 3.2).
 const DNLOAD: u8 = 1;
@@ -36,7 +37,8 @@ const ERROR: u8 = 10;
 /// ST's commands, in a download of block 0 (AN3156 5.2, 5.3).
 const SET_ADDRESS: u8 = 0x21;
 const ERASE: u8 = 0x41;
-/// Looks at a busy bootloader before it is given up: an erasure takes 2 s, and it says how long to wait.
+/// Looks at a busy bootloader before it is given up: an erasure takes 2 s, and it says how long to
+/// wait.
 const LOOKS: u32 = 200;
 
 /// The next thing that the page does.
@@ -84,8 +86,8 @@ pub struct Update {
 }
 
 impl Update {
-    /// Prepares to write `file`, a DfuSe file, to a bootloader that describes its memory as `memory`. Refuses what does not fit
-    /// before anything is erased.
+    /// Prepares to write `file`, a DfuSe file, to a bootloader that describes its memory as
+    /// `memory`. Refuses what does not fit before anything is erased.
     pub fn new(file: &[u8], memory: &str) -> Result<Self, Error> {
         let image = Image::parse(file)?.in_blocks_of(BLOCK);
         let layout = Layout::parse(memory)?;
@@ -95,7 +97,8 @@ impl Update {
         Ok(Self { usb, dialogue })
     }
 
-    /// Returns what to do next. An [`Next::Out`], [`Next::In`] or [`Next::Wait`] is answered before the next call.
+    /// Returns what to do next. An [`Next::Out`], [`Next::In`] or [`Next::Wait`] is answered before
+    /// the next call.
     pub fn advance(&mut self) -> Next {
         match self.dialogue.as_mut().poll(&mut Context::from_waker(Waker::noop())) {
             Poll::Ready(Ok(())) => Next::Done,
@@ -214,7 +217,8 @@ impl Usb {
         self.download(0, data).await
     }
 
-    /// Gives it a block and waits until it has done what that asks for: the first look starts it (AN3156 5).
+    /// Gives it a block and waits until it has done what that asks for: the first look starts it
+    /// (AN3156 5).
     async fn download(&self, block: u16, data: Vec<u8>) -> Result<(), Error> {
         self.out(DNLOAD, block, data).await?;
         for _ in 0..LOOKS {
@@ -237,7 +241,8 @@ impl Usb {
         self.transfer(Next::In { request: UPLOAD, value: block, length: BLOCK as u16 }).await
     }
 
-    /// An empty block ends the update; the bootloader goes to the image with the look that follows (AN3156 5.5), and is gone from the bus.
+    /// An empty block ends the update; the bootloader goes to the image with the look that follows
+    /// (AN3156 5.5), and is gone from the bus.
     async fn leave(&self) -> Result<(), Error> {
         self.out(DNLOAD, FIRST_BLOCK, Vec::new()).await?;
         match self.status().await {

@@ -7,7 +7,8 @@ use crate::refusal::{Field, Refusal, within};
 use crate::stability;
 use fixed::types::{I2F30, I16F16, I32F32, U16F16};
 
-/// The largest share of what was found that is fed forward: 243/256. Rounding, wear and a rotor's angle that is off by 2° stay below the rest.
+/// The largest share of what was found that is fed forward: 243/256. Rounding, wear and a rotor's
+/// angle that is off by 2° stay below the rest.
 const LARGEST_GAIN: u8 = 243;
 /// A compensation may take this share of the torque ceiling; the rest is the law's.
 const TORQUE_SHARE: i32 = 4;
@@ -82,7 +83,8 @@ fn largest(device: &Device, gains: Gains) -> I16F16 {
     .fold(I16F16::ZERO, |sum, (torque, gain)| sum.saturating_add(torque.saturating_mul(gain.share())))
 }
 
-/// Friction is what keeps a stiff wall quiet that is a tick late; a wave by angle is a stiffness of its own.
+/// Friction is what keeps a stiff wall quiet that is a tick late; a wave by angle is a stiffness of
+/// its own.
 fn check_stability(device: &Device, gains: Gains) -> Result<(), Refusal> {
     let found = &device.compensation;
     let has_friction = found.inwards.dry.0.max(found.outwards.dry.0) > I16F16::ZERO;
@@ -143,7 +145,8 @@ fn per_blend(span: I16F16) -> I2F30 {
     I2F30::saturating_from_num(I32F32::ONE / I32F32::from_num(span.max(I16F16::ONE)))
 }
 
-/// Torque that stands even where no force is felt, beside which a needle at rest shows no dead encoder, mN·m.
+/// Torque that is there even where no force is felt, next to which a needle at rest shows no dead
+/// encoder, mN·m.
 pub(crate) fn at_rest(device: &Device) -> U16F16 {
     let gains = Gains { friction: super::Gain(0), ..device.compensation.gains };
     largest(device, gains).unsigned_abs()

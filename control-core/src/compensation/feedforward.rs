@@ -1,7 +1,8 @@
-//! A tick of what is fed forward: from the rotor's angle, the speed and the tilt to a torque beside the law's.
+//! A tick of what is fed forward: from the rotor's angle, the speed and the tilt to a torque beside
+//! the law's.
 //!
-//! Waves are summed in even ticks and ripple in odd ones, weight and gains follow every sixteenth: at 100 mm/s an order of 50
-//! turns by a tenth of a radian in the tick that this costs.
+//! Waves are summed in even ticks and ripple in odd ones, weight and gains follow every sixteenth:
+//! at 100 mm/s an order of 50 turns by a tenth of a radian in the tick that this costs.
 
 use super::{Compensation, Gains, Wave};
 use crate::config::Device;
@@ -10,9 +11,11 @@ use crate::passivity::Account;
 use crate::units::{MillimetresPerSecond, Milliradians};
 use fixed::types::{I2F30, I16F16};
 
-/// The turn, of sixteen ticks, in which weight and gains are renewed; the controller's other turns leave it free.
+/// The turn, of sixteen ticks, in which weight and gains are renewed; the controller's other turns
+/// leave it free.
 const RENEW_TURN: u32 = 1;
-/// By how much a gain moves at each renewal: from 0 to 1 in 0.2 s, so that no change of it is a step.
+/// By how much a gain moves at each renewal: from 0 to 1 in 0.2 s, so that no change of it is a
+/// step.
 const GAIN_STEP: I16F16 = I16F16::from_bits(512);
 
 /// Friction lets go by 2^−11 of itself a tick: with a time constant of 0.2 s.
@@ -77,7 +80,8 @@ impl Feedforward {
         self.wanted = gains.each().map(super::Gain::share);
     }
 
-    /// Another configuration: its gains; and the rotor's angle is to be found again where it may be another one.
+    /// Another configuration: its gains; and the rotor's angle is to be found again where it may be
+    /// another one.
     pub(crate) fn configure(&mut self, before: &Device, after: &Device) {
         let counted = |device: &Device| {
             (
@@ -115,8 +119,9 @@ impl Feedforward {
         self.fed
     }
 
-    /// One tick: the torque to ask for instead of `wanted`, and whether the passivity observer has held some of it back.
-    /// Out of line: a tick that feeds nothing forward is not to pay for it. Not `cold`: that costs such a tick five instructions.
+    /// One tick: the torque to ask for instead of `wanted`, and whether the passivity observer has
+    /// held some of it back. Out of line: a tick that feeds nothing forward is not to pay for it.
+    /// Not `cold`: that costs such a tick five instructions.
     #[inline(never)]
     pub(crate) fn tick(
         &mut self,
@@ -163,8 +168,8 @@ impl Feedforward {
         self.steady = -at_gain(pulls, weight) - at_gain(found.offset.0, drive);
     }
 
-    /// Returns the addition that lifts a torque over the drive's deadband: the half width for torques of at least twice that, less
-    /// below, so that there is no step at zero.
+    /// Returns the addition that lifts a torque over the drive's deadband: the half width for
+    /// torques of at least twice that, less below, so that there is no step at zero.
     fn over_deadband(
         &self,
         found: &Compensation,
@@ -187,7 +192,8 @@ impl Feedforward {
 struct Rubbing {
     /// As found, against the needle's way.
     found: I16F16,
-    /// The friction compensation at a gain of 1, along the motion: zero at rest, the whole friction from the full speed on.
+    /// The friction compensation at a gain of 1, along the motion: zero at rest, the whole friction
+    /// from the full speed on.
     given_back: I16F16,
     /// The direction of the needle, if it moves.
     moves_outwards: Option<bool>,
@@ -218,9 +224,9 @@ fn rubbing(found: &Compensation, plan: &FeedforwardPlan, speed: MillimetresPerSe
     Rubbing { found: force, given_back, moves_outwards: Some(is_outwards) }
 }
 
-/// Friction follows its law at once where it grows or turns round, and lets go slowly: a hand that slows down creeps to its end, and
-/// below the rest speed it would feel all of the friction at once.
-/// Never is it more than what was found at this speed.
+/// Friction follows its law at once where it grows or turns round, and lets go slowly: a hand that
+/// slows down creeps to its end, and below the rest speed it would feel all of the friction at
+/// once. Never is it more than what was found at this speed.
 fn released(before: I16F16, Rubbing { found, given_back, moves_outwards }: Rubbing) -> I16F16 {
     let has_turned = moves_outwards.is_some_and(|outwards| outwards != before.is_negative());
     if has_turned || given_back.saturating_abs() >= before.saturating_abs() {

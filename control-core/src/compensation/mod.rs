@@ -1,9 +1,11 @@
-//! The device's feedforward, by which the hand does not feel the mechanism: cogging and an off-centre mass by the rotor's
-//! angle, dry and viscous friction by direction, weight by tilt, the drive's offset, ripple and deadband. The forces as a
-//! diagnosis found them are here; [`check`] says whether they may be fed forward and `feedforward` does it, tick by tick.
+//! The device's feedforward, by which the hand does not feel the mechanism: cogging and an
+//! off-centre mass by the rotor's angle, dry and viscous friction by direction, weight by tilt, the
+//! drive's offset, ripple and deadband. The forces as a diagnosis found them are here; [`check`]
+//! says whether they may be fed forward and `feedforward` does it, tick by tick.
 //!
-//! Each part is fed forward at a gain below 1, so that some of the mechanism's own friction always remains:
-//! the injected energy is less than the dissipated one. It may not know a force law, and no force law knows it.
+//! Each part is fed forward at a gain below 1, so that some of the mechanism's own friction always
+//! remains: the injected energy is less than the dissipated one. It may not know a force law, and
+//! no force law knows it.
 
 pub mod check;
 pub(crate) mod feedforward;
@@ -19,22 +21,23 @@ pub const MAX_RIPPLES: usize = 4;
 /// Raised whenever a value here comes to mean something else.
 pub const VERSION: u8 = 1;
 
-/// The forces of a mechanism and at which gain each is taken away from the hand. Torques are those that the mechanism adds in
-/// the direction of insertion.
+/// The forces of a mechanism and at which gain each is taken away from the hand. Torques are those
+/// that the mechanism adds in the direction of insertion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Compensation {
     /// [`VERSION`] of whoever wrote it; another one is refused.
     pub version: u8,
     /// Torque by the rotor's angle in mN·m; the first wave of order 0 ends them.
     pub angle: [Wave; MAX_WAVES],
-    /// The excess of the drive's torque over the requested one, by the rotor's angle, as a share of it; as `angle`.
+    /// The excess of the drive's torque over the requested one, by the rotor's angle, as a share of
+    /// it; as `angle`.
     pub ripple: [Wave; MAX_RIPPLES],
     /// Friction on the way in.
     pub inwards: Friction,
     /// Friction on the way out.
     pub outwards: Friction,
-    /// Slower than this no friction is given back: at least the speed of one count in a speed window, so that a needle at
-    /// rest on the edge of a count stays at rest.
+    /// Slower than this no friction is given back: at least the speed of one count in a speed
+    /// window, so that a needle at rest on the edge of a count stays at rest.
     pub rest_speed: MillimetresPerSecond,
     /// From this speed on all of it is; between the two it rises smoothly.
     pub full_speed: MillimetresPerSecond,

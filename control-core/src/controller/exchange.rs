@@ -50,8 +50,9 @@ pub struct TickOutput {
 pub struct Sample {
     /// Counts past the zero.
     pub count: i32,
-    /// The torque as the code of a converter of the same width whose zero is mid-scale, on a motor whose sign is right:
-    /// without the commissioned zero and sign, so that a recording needs no device to be read.
+    /// The torque as the code of a converter of the same width whose zero is mid-scale, on a motor
+    /// whose sign is right: without the commissioned zero and sign, so that a recording needs no
+    /// device to be read.
     pub dac: u16,
     /// [`crate::event::State`] as a number.
     pub state: u8,
@@ -72,8 +73,8 @@ pub enum Order {
     Heartbeat,
     /// Something outside the tick went wrong: torque off, latched.
     Trip(Fault),
-    /// The gains of the compensation from now on, until the next [`LargeOrder::Configure`]; they have passed
-    /// [`crate::compensation::check::check`].
+    /// The gains of the compensation from now on, until the next [`LargeOrder::Configure`]; they
+    /// have passed [`crate::compensation::check::check`].
     Compensate(Gains),
 }
 
@@ -83,13 +84,14 @@ pub enum Order {
 pub enum LargeOrder {
     /// Another plan.
     Configure(Plan),
-    /// Play an excitation from where the motor is; on a device that has not been commissioned only where
-    /// [`Excitation::is_gentle`]. It has passed [`Excitation::check`].
+    /// Play an excitation from where the motor is; on a device that has not been commissioned only
+    /// where [`Excitation::is_gentle`]. It has passed [`Excitation::check`].
     Excite(Excitation),
-    /// Play the segments of a sequence one after the other, without a rest between them; only on a device that has been
-    /// commissioned.
+    /// Play the segments of a sequence one after the other, without a rest between them; only on a
+    /// device that has been commissioned.
     Play(Prepared),
-    /// The rotor's angle, from which waves are counted, is zero at this many counts past the zero; `None`: it is not known.
+    /// The rotor's angle, from which waves are counted, is zero at this many counts past the zero;
+    /// `None`: it is not known.
     Index(Option<Counts>),
 }
 

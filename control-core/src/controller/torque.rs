@@ -1,4 +1,5 @@
-//! The torque of a tick: what the law or the excitation asks for, what is fed forward beside it, and what the limits leave of it.
+//! The torque of a tick: what the law or the excitation asks for, what is fed forward beside it,
+//! and what the limits leave of it.
 
 use super::{Core, Mode};
 use crate::compensation::feedforward::RotorState;
@@ -11,7 +12,8 @@ use core::borrow::BorrowMut;
 use fixed::types::I16F16;
 
 impl Core {
-    /// Motor torque that the law or the excitation asks for; none where torque is off. N times mm is mN·m.
+    /// Motor torque that the law or the excitation asks for; none where torque is off. N times mm
+    /// is mN·m.
     pub(super) fn wanted_torque(
         &mut self,
         segments: &mut impl BorrowMut<Segments>,
@@ -27,8 +29,9 @@ impl Core {
                 let (given, damped) =
                     self.observer.tick(self.plan.bounce_damping, depth, force, has_given_way);
                 let limits = if damped { Limits::PASSIVITY } else { Limits::default() };
-                // Each wall and friction stay below the 125 N of the strongest motor, damping below 17 N: with 25 mm that fits.
-                // Were it ever more, it would be too much, and not the other way.
+                // Each wall and friction stay below the 125 N of the strongest motor, damping below
+                // 17 N: with 25 mm that fits. Were it ever more, it would be too much, and not the
+                // other way.
                 let torque = saturating_multiply(given.0, self.plan.lever).saturating_neg();
                 let before = self.limiter.given().0.saturating_sub(self.feedforward.fed());
                 Some((MillinewtonMetres(self.runaway.steady(torque, before)), limits))
@@ -62,7 +65,8 @@ impl Core {
         (MillinewtonMetres(torque), if is_held { limits.with(Limits::PASSIVITY) } else { limits })
     }
 
-    /// Returns the part of the torque `held` that is given while the encoder is asked whether it counts.
+    /// Returns the part of the torque `held` that is given while the encoder is asked whether it
+    /// counts.
     #[cold]
     #[inline(never)]
     fn left_while_asking(&mut self, held: I16F16) -> I16F16 {

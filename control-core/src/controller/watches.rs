@@ -1,4 +1,5 @@
-//! The watches of a tick, apart from the force: the host, the way the needle moves, an encoder that no longer counts, and the winding.
+//! The watches of a tick, apart from the force: the host, the way the needle moves, an encoder that
+//! no longer counts, and the winding.
 
 use super::{Core, LOOK_TURN, Mode};
 use crate::anatomy;
@@ -48,8 +49,9 @@ impl Core {
         }
     }
 
-    /// True if an excitation moves a needle so that is wired rightly: it may be faster than a hand on purpose, up to a bound of its own; under
-    /// its servo the mechanism may drive the needle against the motor for a moment; and its sines may shake the needle over one count.
+    /// True if an excitation moves a needle so that is wired rightly: it may be faster than a hand
+    /// on purpose, up to a bound of its own; under its servo the mechanism may drive the needle
+    /// against the motor for a moment; and its sines may shake the needle over one count.
     fn is_asked_for(&self, fault: Fault) -> bool {
         match fault {
             Fault::Overspeed => {
@@ -63,13 +65,14 @@ impl Core {
         }
     }
 
-    /// The look for an encoder that no longer counts. A count up and down again is less than one: a live channel gives them when
-    /// the other one is dead.
+    /// The look for an encoder that no longer counts. A count up and down again is less than one: a
+    /// live channel gives them when the other one is dead.
     pub(super) fn look_at_stillness(&mut self) {
         if self.still.is_moving() {
             return self.still.forget();
         }
-        // While the encoder is asked, what would be given counts, and else what is: less while it fades in.
+        // While the encoder is asked, what would be given counts, and else what is: less while it
+        // fades in.
         let torque = if self.still.is_asking() { self.asked } else { self.limiter.given().0 };
         self.still.look(torque.unsigned_abs() >= self.plan.loaded_torque);
         if self.still.is_asking() || self.still.is_doubtful(self.lines_agree) {

@@ -10,7 +10,8 @@ use core::borrow::BorrowMut;
 #[derive(Clone, Debug)]
 pub struct Controller<S = Segments> {
     core: Core,
-    /// Nothing plays them but an excitation, and each begins with segments of its own: those that a fault leaves behind are never played.
+    /// Nothing plays them but an excitation, and each begins with segments of its own: those that a
+    /// fault leaves behind are never played.
     segments: S,
 }
 
@@ -56,14 +57,16 @@ impl<S: BorrowMut<Segments>> Controller<S> {
         self.core.heartbeat();
     }
 
-    /// Says that the tissue's surface is displaced by so much along the needle: the law of Paper 000 counts depth from there. At most 3 mm
-    /// count, they change by at most 20 mm/s, and they go back to 0 if they are not said again within 50 ms. The firmware never says it.
+    /// Says that the tissue's surface is displaced by so much along the needle: the law of Paper
+    /// 000 counts depth from there. At most 3 mm count, they change by at most 20 mm/s, and they go
+    /// back to 0 if they are not said again within 50 ms. The firmware never says it.
     pub fn displace(&mut self, displacement: Millimetres) {
         self.core.displace(displacement);
     }
 
-    /// Says, until it is said again, whether both of the encoder's lines are at one level, as they also are without its supply or
-    /// its ground. An encoder without lines, such as a simulated one, leaves it at `false`.
+    /// Says, until it is said again, whether both of the encoder's lines are at one level, as they
+    /// also are without its supply or its ground. An encoder without lines, such as a simulated
+    /// one, leaves it at `false`.
     #[inline]
     pub fn set_lines_agree(&mut self, agree: bool) {
         self.core.set_lines_agree(agree);

@@ -10,14 +10,16 @@ use heapless::Vec;
 /// The most segments of a sequence.
 pub const MAX_SEGMENTS: usize = 8;
 
-/// A sequence that is ready to be played: what takes long to compute has been computed before the tick gets it.
+/// A sequence that is ready to be played: what takes long to compute has been computed before the
+/// tick gets it.
 #[derive(Clone, Debug)]
 pub struct Prepared {
     segments: Segments,
     is_compensated: bool,
 }
 
-/// Room for what plays, in order. It is large: a board keeps it apart from what every tick uses, and it is filled where it is.
+/// Room for what plays, in order. It is large: a board keeps it apart from what every tick uses,
+/// and it is filled where it is.
 #[derive(Clone, Debug, Default)]
 pub struct Segments(Vec<Segment, MAX_SEGMENTS>);
 
@@ -153,8 +155,8 @@ impl Player {
         Some(MillinewtonMetres(saturating_multiply(force, roller_radius.0).saturating_add(target.torque.0)))
     }
 
-    /// The reference goes on from where it is, so that the servo does not jerk. Where no servo held the motor to it, it goes on from where
-    /// the motor is.
+    /// The reference goes on from where it is, so that the servo does not jerk. Where no servo held
+    /// the motor to it, it goes on from where the motor is.
     #[cold]
     #[inline(never)]
     fn next_segment(&mut self, segments: &Segments, depth: Millimetres) {
@@ -169,9 +171,10 @@ impl Player {
         self.take_limits(segments);
     }
 
-    /// True if the motor is faster than it has to be to follow, and than a torque without a servo makes it where a hand trips at `hand`:
-    /// three times that, half of what counts as a jump of the encoder. The pulses of `commission` reach 0.77 m/s where a hand
-    /// trips at 0.42, and a motor still runs on when the next excitation begins.
+    /// True if the motor is faster than it has to be to follow, and than a torque without a servo
+    /// makes it where a hand trips at `hand`: three times that, half of what counts as a jump of
+    /// the encoder. The pulses of `commission` reach 0.77 m/s where a hand trips at 0.42, and a
+    /// motor still runs on when the next excitation begins.
     #[cold]
     pub(crate) fn is_too_fast(&self, speed: MillimetresPerSecond, hand: MillimetresPerSecond) -> bool {
         speed > self.too_fast && speed.0 > hand.0.saturating_mul_int(3)

@@ -144,8 +144,8 @@ pub struct Reach {
 }
 
 impl Reach {
-    /// Returns the state of a signal that so many calls of [`Reference::tick`] lead to, computed leg by leg and without the cycles
-    /// that begin again.
+    /// Returns the state of a signal that so many calls of [`Reference::tick`] lead to, computed
+    /// leg by leg and without the cycles that begin again.
     pub fn after(signal: &Signal, ticks: u32) -> Self {
         let legs = 2 * u32::from(steps_and_ratio(signal).0);
         let mut walk =
@@ -188,7 +188,8 @@ impl Walk {
     }
 }
 
-/// The number of steps of a series, and the ratio of one to the one before; one step if the signal has none.
+/// The number of steps of a series, and the ratio of one to the one before; one step if the signal
+/// has none.
 fn steps_and_ratio(signal: &Signal) -> (u8, I16F16) {
     match signal {
         Signal::SpeedStaircase { steps, ratio, .. } | Signal::ReversalLadder { steps, ratio, .. } => {
@@ -207,7 +208,8 @@ fn first_stage(signal: &Signal) -> I16F16 {
     }
 }
 
-/// The way of a tick at `speed`, which is not negative, in two divisions of a word: the board has none for more.
+/// The way of a tick at `speed`, which is not negative, in two divisions of a word: the board has
+/// none for more.
 fn way_per_tick(speed: I16F16) -> I32F32 {
     let bits = speed.to_bits().unsigned_abs();
     let (whole, rest) = (bits / TICK_HZ, bits % TICK_HZ);

@@ -1,5 +1,6 @@
-//! Excitations that a PC uploads one by one and that play one after the other without a rest between them. An upload starts nothing: the
-//! whole is checked once more when it is to play, against the ceilings that are in force then.
+//! Excitations that a PC uploads one by one and that play one after the other without a rest
+//! between them. An upload starts nothing: the whole is checked once more when it is to play,
+//! against the ceilings that are in force then.
 
 use super::Excitation;
 use super::player::{MAX_SEGMENTS, Prepared, ticks};
@@ -118,10 +119,12 @@ impl Sequence {
         &self.segments
     }
 
-    /// Takes a segment; the first begins another sequence. One that is refused takes all those before it along.
+    /// Takes a segment; the first begins another sequence. One that is refused takes all those
+    /// before it along.
     ///
     /// # Errors
-    /// The reason if it is not the next one, if there is no room, or if the device may not play it after those before it under `plan`.
+    /// The reason if it is not the next one, if there is no room, or if the device may not play it
+    /// after those before it under `plan`.
     pub fn upload(&mut self, index: u8, segment: Excitation, plan: &Plan) -> Result<(), SequenceRefusal> {
         if index == 0 {
             self.forget();
@@ -148,8 +151,9 @@ impl Sequence {
         self.segments.clear();
     }
 
-    /// Checks all of it against the ceilings of `plan`: each segment as an excitation by itself, the length of all, and the way of the
-    /// reference, which goes on from segment to segment and must stay within each segment's travel from where the first began.
+    /// Checks all of it against the ceilings of `plan`: each segment as an excitation by itself,
+    /// the length of all, and the way of the reference, which goes on from segment to segment and
+    /// must stay within each segment's travel from where the first began.
     ///
     /// # Errors
     /// The first reason that is found.

@@ -38,8 +38,8 @@ pub enum FrictionLaw {
         /// Stiffness of the hold below the limit.
         stiffness: Stiffness,
     },
-    /// The same with a static and a dynamic level: a needle at rest is held up to the friction limit, and a sliding one is rubbed with
-    /// a share of it.
+    /// The same with a static and a dynamic level: a needle at rest is held up to the friction
+    /// limit, and a sliding one is rubbed with a share of it.
     StickSlip {
         /// Stiffness of the hold below the limit.
         stiffness: Stiffness,
@@ -52,19 +52,21 @@ pub enum FrictionLaw {
 #[derive(Clone, Copy, Debug)]
 struct Rub {
     per_mm: I2F30,
-    /// Friction limit in N that the layers above have added up to with the needle straight in. No motor that is accepted gives 128 N.
+    /// Friction limit in N that the layers above have added up to with the needle straight in. No
+    /// motor that is accepted gives 128 N.
     above: I8F24,
 }
 
-/// The forces of the tissue ready for the tick, in the order of the [`crate::anatomy::Anatomy`] that [`crate::plan`] has
-/// made with them.
+/// The forces of the tissue ready for the tick, in the order of the [`crate::anatomy::Anatomy`]
+/// that [`crate::plan`] has made with them.
 #[derive(Clone, Debug)]
 pub(crate) struct Plan {
     /// One entry for each wall.
     walls: Vec<wall::Wall, MAX_LAYERS>,
     /// One entry for each layer.
     rubs: Vec<Rub, MAX_LAYERS>,
-    /// The needle is held by friction once the outermost wall has given way: 1, or 0 where there is none.
+    /// The needle is held by friction once the outermost wall has given way: 1, or 0 where there is
+    /// none.
     walls_that_close: usize,
     friction: friction::Law,
 }
@@ -122,7 +124,8 @@ impl Default for Memory {
 struct Walls {
     force: I16F16,
     pressing: bool,
-    /// Negative while any still falls along its relief parabola: the bits of [`Cut::past_vertex`] of all.
+    /// Negative while any still falls along its relief parabola: the bits of [`Cut::past_vertex`]
+    /// of all.
     past_vertex: I16F16,
 }
 
@@ -249,8 +252,9 @@ fn plan_friction(law: &FrictionLaw) -> friction::Law {
     }
 }
 
-/// At whatever angle: each wall with the friction up to it, and friction at the end of the travel. The flatter the needle,
-/// the longer its way through each layer, and the force is largest where the next layer is just out of reach.
+/// At whatever angle: each wall with the friction up to it, and friction at the end of the travel.
+/// The flatter the needle, the longer its way through each layer, and the force is largest where
+/// the next layer is just out of reach.
 fn check_along(limits: &ForceLimits) -> Result<(), Refusal> {
     let travel = limits.travel;
     let flattest = reciprocal(sine(SMALLEST_ANGLE));

@@ -1,6 +1,7 @@
-//! The laws of force: what the needle feels of the anatomy that it has met. Each is a file with what a person configures,
-//! what of it may run (`Plan`), what the tick remembers (`Memory`) and the tick itself; a fourth is one more file and one more
-//! line at the end of this one. A law knows no device: [`ForceLimits`] says what it may ask for.
+//! The laws of force: what the needle feels of the anatomy that it has met. Each is a file with
+//! what a person configures, what of it may run (`Plan`), what the tick remembers (`Memory`) and
+//! the tick itself; a fourth is one more file and one more line at the end of this one. A law knows
+//! no device: [`ForceLimits`] says what it may ask for.
 
 use crate::anatomy::Insertion;
 use crate::event::State;
@@ -78,7 +79,8 @@ impl Response {
     };
 }
 
-/// `1 − e^{−T/τ}` for T of one tick and τ in ms: with T/τ ≤ 0.02 three terms of the series leave less than 1e-8.
+/// `1 − e^{−T/τ}` for T of one tick and τ in ms: with T/τ ≤ 0.02 three terms of the series leave
+/// less than 1e-8.
 fn follow_share(tau_ms: u16) -> I2F30 {
     let y = I2F30::ONE / i32::from(tau_ms.max(1)) / 10;
     let y2 = y.saturating_mul(y);
@@ -110,7 +112,8 @@ macro_rules! laws {
         pub(crate) enum Memory { $($name($module::Memory)),+ }
 
         impl Law {
-            /// The steepest slope with which it holds a needle inside tissue, beside its walls, in N/mm.
+            /// The steepest slope with which it holds a needle inside tissue, beside its walls, in
+            /// N/mm.
             pub(crate) fn hold(&self) -> I16F16 {
                 match self { $(Law::$name(config) => config.hold()),+ }
             }
@@ -137,14 +140,16 @@ macro_rules! laws {
         }
 
         impl Memory {
-            /// Depth counts from a surface that is displaced by so much along the needle, if the law can use it.
+            /// Depth counts from a surface that is displaced by so much along the needle, if the
+            /// law can use it.
             pub(crate) fn displace(&mut self, displacement: Millimetres) {
                 if let Memory::Xr(memory) = self {
                     memory.displace(displacement);
                 }
             }
 
-            /// One tick of `law`, of which `plan` was made, with a needle that moves so, where `met` says what it has met.
+            /// One tick of `law`, of which `plan` was made, with a needle that moves so, where
+            /// `met` says what it has met.
             pub(crate) fn tick(
                 &mut self,
                 law: &Law,
@@ -167,7 +172,8 @@ macro_rules! laws {
 laws! {
     /// Paper 001: the jog effect of each wall, and friction in each layer.
     Jog(FrictionLaw) => jog,
-    /// Paper 002: walls that rise along a polynomial, tracking walls, LuGre friction, a fixture of the direction.
+    /// Paper 002: walls that rise along a polynomial, tracking walls, LuGre friction, a fixture of
+    /// the direction.
     Sparte(Sparte) => sparte,
     /// Paper 000: a table over depth, speed and angle.
     Xr(ForceTable) => xr,

@@ -1,14 +1,17 @@
-//! The law of Paper 002 (SPARTE), for an injection into a joint: a wall rises along a polynomial of second order until it
-//! gives way; then the tip cuts against a *tracking wall*, which follows it at a distance that makes the cutting force of its
-//! layer, while LuGre friction rubs along the shaft; on the way out both act the other way, cutting with magnitudes of its
-//! own. A fixture holds the direction of entry: its lateral force is computed and told, for this device turns freely.
+//! The law of Paper 002 (SPARTE), for an injection into a joint: a wall rises along a polynomial of
+//! second order until it gives way; then the tip cuts against a *tracking wall*, which follows it
+//! at a distance that makes the cutting force of its layer, while LuGre friction rubs along the
+//! shaft; on the way out both act the other way, cutting with magnitudes of its own. A fixture
+//! holds the direction of entry: its lateral force is computed and told, for this device turns
+//! freely.
 //!
-//! Tracking wall: `z = x − w`, `w` dragged so that `−F_out/K ≤ z ≤ F_in/K`, `F = K·z`. A needle that has not gone on for 20 ms has
-//! stopped: `w` comes after it with a time constant until only the friction that holds the needle is left. Where a wall of the
-//! anatomy gives way, the tip cuts already: `w` is put where it makes a share of the cutting force, so that the force falls below
-//! that and rises to it again.
-//! LuGre (Canudas de Wit 1995): `ż = v − σ₀|v|z/g`, `g = F_c + (F_s − F_c)e^{−(v/v_s)²}`, `F = σ₀z + σ₁ż + σ₂v`, stepped
-//! implicitly over the tick's own travel Δx, `z⁺ = (z + Δx)(1 − σ₀|Δx|/(g + σ₀|Δx|))`, which is stable at any speed.
+//! Tracking wall: `z = x − w`, `w` dragged so that `−F_out/K ≤ z ≤ F_in/K`, `F = K·z`. A needle
+//! that has not gone on for 20 ms has stopped: `w` comes after it with a time constant until only
+//! the friction that holds the needle is left. Where a wall of the anatomy gives way, the tip cuts
+//! already: `w` is put where it makes a share of the cutting force, so that the force falls below
+//! that and rises to it again. LuGre (Canudas de Wit 1995): `ż = v − σ₀|v|z/g`, `g = F_c + (F_s −
+//! F_c)e^{−(v/v_s)²}`, `F = σ₀z + σ₁ż + σ₂v`, stepped implicitly over the tick's own travel Δx,
+//! `z⁺ = (z + Δx)(1 − σ₀|Δx|/(g + σ₀|Δx|))`, which is stable at any speed.
 
 use super::{ForceLimits, LayerHit, Motion, Response, follow_share, reach};
 use crate::anatomy::Insertion;
@@ -31,10 +34,12 @@ const LARGEST_STEP: i32 = 16 << 16;
 const FASTEST: I16F16 = I16F16::from_bits(50 << 16);
 /// Faster than this the friction grows no more: 1,000 mm/s.
 const LARGEST_SPEED: i32 = 1_000 << 16;
-/// The barrier is told again once the needle was turned back to this share of the largest angle, in 256ths.
+/// The barrier is reported again once the needle was turned back to this share of the largest
+/// angle, in 256ths.
 const REARMED_256: i32 = 230;
 
-/// The additions of Paper 002's law to the layers: their walls' rising parabolas are its polynomials of second order.
+/// The additions of Paper 002's law to the layers: their walls' rising parabolas are its
+/// polynomials of second order.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Sparte {
     /// K of the tracking wall.
@@ -211,8 +216,8 @@ impl Memory {
         Response { force, state, lateral, barrier, ..Response::NONE }
     }
 
-    /// The force of the tracking wall, and whether it is dragged along. What the tip presses on is not cut: as the wall that
-    /// is pushed in takes over, cutting gives way to it.
+    /// The force of the tracking wall, and whether it is dragged along. What the tip presses on is
+    /// not cut: as the wall that is pushed in takes over, cutting gives way to it.
     fn track(
         &mut self,
         config: &Sparte,
@@ -255,8 +260,8 @@ impl Memory {
         I16F16::from_bits(held + damped + viscous)
     }
 
-    /// The lateral force that would bring the needle back to its direction of entry, and whether it has just been turned
-    /// beyond the largest angle.
+    /// The lateral force that would bring the needle back to its direction of entry, and whether it
+    /// has just been turned beyond the largest angle.
     fn hold_direction(&mut self, fixture: &Fixture, angle: Milliradians) -> (Newtons, bool) {
         let entry = *self.entry.get_or_insert(angle);
         let largest = i32::from(fixture.largest.0);

@@ -1,13 +1,16 @@
-//! The law of paper 000: `F(depth, speed, angle)` from a table that was fitted to insertions at constant speed and angle.
+//! The law of paper 000: `F(depth, speed, angle)` from a table that was fitted to insertions at
+//! constant speed and angle.
 //!
-//! Knots that have the same number in every cell of speed and angle belong together: the tip's contact, the force at which a layer
-//! gives way, the end of its fall. Depth and force of a knot lie linearly between the cells, force linearly between two knots; beyond
-//! the table it is level. So a layer that gives way deeper at another speed does so in between, too.
+//! Knots that have the same number in every cell of speed and angle belong together: the tip's
+//! contact, the force at which a layer gives way, the end of its fall. Depth and force of a knot
+//! lie linearly between the cells, force linearly between two knots; beyond the table it is level.
+//! So a layer that gives way deeper at another speed does so in between, too.
 //!
-//! A layer *gives way once*. From there on the needle has a track: in it, the force is the lower hull of the table, what is left
-//! where nothing has to give way. Beside the track the tissue is whole. The paper says nothing of it, nor of a needle that rests or is
-//! drawn back: there the force is held by a clamped proxy, `F = K·(x − w)` within what the table gives inwards and a share of it
-//! outwards.
+//! A layer *gives way once*. From there on the needle has a track: in it, the force is the lower
+//! hull of the table: the force where nothing has to give way. Beside the track the tissue is
+//! whole. The paper says nothing of it, nor of a needle that rests or is drawn back: there the
+//! force is held by a clamped proxy, `F = K·(x − w)` within what the table gives inwards and a
+//! share of it outwards.
 
 mod cells;
 mod check;
@@ -41,27 +44,33 @@ pub const MAX_ANGLES: usize = 3;
 const DEEPEST: i32 = 200 << 16;
 const MAX_CELLS: usize = MAX_SPEEDS * MAX_ANGLES;
 
-/// A needle whose tip is this far from its track goes beside it: 1 mm, the width of a cannula; an assumption. In mm·mrad, Q16.
+/// A needle whose tip is this far from its track goes beside it: 1 mm, the width of a cannula; an
+/// assumption. In mm·mrad, Q16.
 const BESIDE: i64 = 1_000 << 16;
-/// A needle drawn out this far enters at another place, where the tissue is whole: 3 mm; an assumption.
+/// A needle drawn out this far enters at another place, where the tissue is whole: 3 mm; an
+/// assumption.
 const ANOTHER_ENTRY: I16F16 = I16F16::from_bits(3 << 16);
 
 /// The force of an insertion over depth, speed along the needle and angle to the skin.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ForceTable {
-    /// The depth of each knot in 0.01 mm, up to 163.83 mm, rising by 5 or more; the first is at or below the skin. Depth is perpendicular to it, as the layers' are. In
-    /// the order of `forces`, or one for each knot where it lies at the same depth in all cells.
+    /// The depth of each knot in 0.01 mm, up to 163.83 mm, rising by 5 or more; the first is at or
+    /// below the skin. Depth is perpendicular to it, as the layers' are. In the order of `forces`,
+    /// or one for each knot that is at the same depth in all cells.
     pub depths: Vec<u16, { MAX_DEPTHS * MAX_CELLS }>,
     /// Rising.
     pub speeds: Vec<MillimetresPerSecond, MAX_SPEEDS>,
     /// To the skin, rising.
     pub angles: Vec<Milliradians, MAX_ANGLES>,
-    /// In mN, up to 16 N, one for each knot, speed and angle: the angles of a speed together, then speeds, then knots.
+    /// In mN, up to 16 N, one for each knot, speed and angle: the angles of a speed together, then
+    /// speeds, then knots.
     pub forces: Vec<u16, { MAX_DEPTHS * MAX_CELLS }>,
-    /// Knots at which a layer gives way, rising; none where rupture is left to the shape of the curve.
+    /// Knots at which a layer gives way, rising; none where rupture is left to the shape of the
+    /// curve.
     pub gives_way: Vec<u8, MAX_LAYERS>,
-    /// A bit for each speed and angle that was measured: bit `speed · angles + angle`. The others hold an estimate, the
-    /// product of what speed and angle do each by itself, and are reported as one.
+    /// A bit for each speed and angle that was measured: bit `speed · angles + angle`. The others
+    /// hold an estimate, the product of what speed and angle do each by itself, and are reported as
+    /// one.
     pub measured: u16,
     /// K of the proxy that holds the needle at rest; no steeper slope is felt.
     pub stiffness: Stiffness,
@@ -168,8 +177,8 @@ impl Plan {
         table.depths.get(index).copied().map_or(0, i32::from)
     }
 
-    /// Returns the place of a depth among the knots of these cells. It is looked for from `near` on, a knot a tick: a needle that goes faster
-    /// than a knot a tick trips the device.
+    /// Returns the place of a depth among the knots of these cells. It is looked for from `near`
+    /// on, a knot a tick: a needle that goes faster than a knot a tick trips the device.
     fn position(&self, table: &ForceTable, cells: &Cells, near: usize, depth: I16F16) -> Position {
         // 0.01 mm in Q16: beyond the table's deepest knot, nothing changes.
         let depth = depth.to_bits().min(DEEPEST) * 100;
@@ -215,7 +224,8 @@ struct Track {
 }
 
 impl Track {
-    /// Follows a tip that is `at` a knot, Q16, and `along` the needle past the skin. A bit for the layer that gives way now.
+    /// Follows a tip that is `at` a knot, Q16, and `along` the needle past the skin. A bit for the
+    /// layer that gives way now.
     fn follow(&mut self, plan: &Plan, at: u32, along: I16F16, angle: Milliradians) -> u8 {
         let off = i64::from((i32::from(angle.0) - i32::from(self.angle.0)).abs());
         if self.given > 0 && off * i64::from(along.to_bits()) > BESIDE {

@@ -30,7 +30,8 @@ enum Way {
     Beside { depth: Millimetres },
 }
 
-/// Prepares what has been checked; `ruptures` has a bit for each layer that gives way by the law of force.
+/// Prepares what has been checked; `ruptures` has a bit for each layer that gives way by the law of
+/// force.
 pub(super) fn plan(config: &Config, met: &Meeting, ruptures: u8) -> Anatomy {
     let mut anatomy =
         Anatomy { vessel: None, skin_tilt: config.device.skin_tilt.0, layers: Vec::new(), walls: Vec::new() };
@@ -92,7 +93,8 @@ fn check_layers(config: &Config) -> Result<(), Refusal> {
     Ok(())
 }
 
-/// The depth at which the layer's wall gives way with the needle straight in; where there is none, its top.
+/// The depth at which the layer's wall gives way with the needle straight in; where there is none,
+/// its top.
 fn gives_way(layer: &Layer) -> I16F16 {
     layer.depth.0.saturating_add(layer.wall.map_or(I16F16::ZERO, |wall| wall.puncture_travel.0))
 }
@@ -118,8 +120,8 @@ fn vessel_walls(config: &Config) -> Result<Option<(usize, Option<usize>)>, Refus
     }
 }
 
-/// The layers that the needle meets: without a vessel that it passes beside, and with one as high as it is where the needle
-/// goes through.
+/// The layers that the needle meets: without a vessel that it passes beside, and with one as high
+/// as it is where the needle goes through.
 pub(super) fn met(config: &Config) -> Result<Meeting, Refusal> {
     check_layers(config)?;
     let layers = &config.patient.layers;
@@ -147,7 +149,8 @@ pub(super) fn met(config: &Config) -> Result<Meeting, Refusal> {
     Ok(Meeting { layers: met, way: Some(through) })
 }
 
-/// Returns the share of the vessel's height that a needle beside the axis passes, √(1 − (2·offset/width)²).
+/// Returns the share of the vessel's height that a needle beside the axis passes, √(1 −
+/// (2·offset/width)²).
 fn chord(shape: &Vessel) -> Result<I16F16, Refusal> {
     within(Field::VesselWidth, shape.width.0, milli(200), milli(30_000))?;
     within(Field::VesselOffset, shape.offset.0, milli(-100_000), milli(100_000))?;

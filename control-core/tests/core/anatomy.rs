@@ -1,5 +1,5 @@
-//! Layers lie in the body and the needle meets them where it comes to them: at any angle, in their order, beside a vessel or
-//! through it.
+//! Layers lie in the body and the needle meets them where it comes to them: at any angle, in their
+//! order, beside a vessel or through it.
 
 use control_core::config::{Layer, Tissue, Vessel};
 use control_core::event::VesselState;
@@ -104,7 +104,8 @@ fn a_wall_that_holds_carries_the_next_one_along() {
 
 #[test]
 fn skin_indentation_delays_the_next_layer_until_relieved() {
-    // Given way at 3 mm, 0.3 of it left, gone at 4 mm: a layer 3.5 mm deep is met where x = 3.5 + 0.9·(4 − x).
+    // Given way at 3 mm, 0.3 of it left, gone at 4 mm: a layer 3.5 mm deep is met where x = 3.5 +
+    // 0.9·(4 − x).
     let mut config = Config::commissioned_virtual();
     config.patient.layers[1].depth = Millimetres(q(3.5));
     let (contacts, _) = Needle::new(&config, 90.0).met(6.0);
@@ -114,8 +115,9 @@ fn skin_indentation_delays_the_next_layer_until_relieved() {
     assert!((contacts[1].1 - 3.5).abs() < COUNT_MM, "sprung back at once: {contacts:?}");
 }
 
-/// A vein so deep below the skin, which gives way at 3 mm, that it was carried along with the skin, comes to rest on the relief, or does
-/// not move at all: what it resists with at a depth is one force, however fast the needle came there.
+/// A vein so deep below the skin, which gives way at 3 mm, that it was carried along with the skin,
+/// comes to rest on the relief, or does not move at all: what it resists with at a depth is one
+/// force, however fast the needle came there.
 #[test]
 fn where_a_wall_is_met_does_not_depend_on_when_a_tick_falls() {
     for depth in [1.0, 2.5, 3.2, 3.9, 3.96, 3.99, 4.05] {
@@ -177,7 +179,8 @@ fn a_needle_off_the_axis_crosses_less_of_the_vessel() {
         config.patient.vessel = Some(Vessel { width: Millimetres(q(4.0)), offset: Millimetres(q(offset)) });
         config
     };
-    // 3 mm high: 1 mm of 2 off the axis, √(1 − ¼) of it are left, so that the wall lies 1.5·(1 − 0.866) = 0.201 mm deeper.
+    // 3 mm high: 1 mm of 2 off the axis, √(1 − ¼) of it are left, so that the wall lies 1.5·(1 −
+    // 0.866) = 0.201 mm deeper.
     for offset in [1.0, -1.0] {
         let (contacts, _) = Needle::new(&beside(offset), 90.0).met(8.5);
         let at = |layer: u8| contacts.iter().find(|(l, _)| *l == layer).expect("it is met").1;

@@ -1,4 +1,5 @@
-//! Tests of the feedforward: fixed point against its floating-point twin, when it is on, and what is refused.
+//! Tests of the feedforward: fixed point against its floating-point twin, when it is on, and what
+//! is refused.
 
 use control_core::compensation::{Compensation, Friction, Gain, Gains, Wave};
 use control_core::config::Device;
@@ -335,7 +336,8 @@ fn an_excitation_plays_without_compensation_unless_asked() {
     }
 }
 
-/// A needle at rest on the edge of a count, a needle that creeps: no friction is given back, so nothing starts to move.
+/// A needle at rest on the edge of a count, a needle that creeps: no friction is given back, so
+/// nothing starts to move.
 #[test]
 fn a_count_to_and_fro_is_rest() {
     let mut controller = running(Compensation {
@@ -387,7 +389,8 @@ fn what_may_not_be_fed_forward_is_refused_with_the_reason() {
 
 #[test]
 fn too_strong_and_unstable_compensations_are_refused() {
-    // A quarter of 28.8 mN·m is 7.2. At a half, waves ask for 0.65, friction for 0.3 and the drive for 0.2.
+    // A quarter of 28.8 mN·m is 7.2. At a half, waves ask for 0.65, friction for 0.3 and the drive
+    // for 0.2.
     assert_eq!(refused(|device| device.compensation.weight.0 = q(12.0)), None);
     let strong = refused(|device| device.compensation.weight.0 = q(12.2));
     assert!(matches!(strong, Some(Refusal::CompensationTooStrong { .. })), "{strong:?}");

@@ -233,7 +233,8 @@ fn trips_at(signal: Signal, speed: f64) -> Option<(usize, Fault)> {
     })
 }
 
-/// An excitation may be faster than a hand, up to three times or to half as fast again as its own reference.
+/// An excitation may be faster than a hand, up to three times or to half as fast again as its own
+/// reference.
 #[test]
 fn overspeed_trips_during_an_excitation() {
     let triangle = |speed: f64| Signal::Triangle {
@@ -257,8 +258,9 @@ fn overspeed_trips_during_an_excitation() {
     }
 }
 
-/// A needle of 14 g with 0.04 N of dry friction under a motor that gives `sign` times the torque that was asked for `late` ticks ago: the
-/// fault that ends `signal`, and how far the needle has then gone, in mm.
+/// A needle of 14 g with 0.04 N of dry friction under a motor that gives `sign` times the torque
+/// that was asked for `late` ticks ago: the fault that ends `signal`, and how far the needle has
+/// then gone, in mm.
 fn driven(signal: Signal, sign: f64, late: usize) -> Option<(Fault, f64)> {
     let plan = Config::commissioned_virtual().plan().expect("sound");
     let (mm_per_count, zero) = (plan.mm_per_count().to_num::<f64>(), f64::from(plan.zero_torque_code().0));
@@ -308,7 +310,8 @@ fn swapped_leads_under_a_servo_are_found_in_every_signal() {
     }
 }
 
-/// Sines of a quarter of a period in 4 ms and less: the motor gives one way what is asked for the other way.
+/// Sines of a quarter of a period in 4 ms and less: the motor gives one way what is asked for the
+/// other way.
 #[test]
 fn a_motor_that_obeys_late_is_not_wired_the_wrong_way() {
     for late in [10, 20, 28, 34, 40] {
@@ -317,7 +320,8 @@ fn a_motor_that_obeys_late_is_not_wired_the_wrong_way() {
     }
 }
 
-/// Two counts to and fro at 0.5 kHz: an encoder with a dead channel, or a needle that sines shake over one edge.
+/// Two counts to and fro at 0.5 kHz: an encoder with a dead channel, or a needle that sines shake
+/// over one edge.
 #[test]
 fn counts_to_and_fro_are_a_dead_channel_unless_sines_shake() {
     let fault_of = |signal: Signal| {

@@ -1,4 +1,5 @@
-//! Tests of the laws where a person would notice: at rest, on the way in, on the way out, at a fault.
+//! Tests of the laws where a person would notice: at rest, on the way in, on the way out, at a
+//! fault.
 
 use control_core::config::{FrictionLaw, Law, Layer, Parabola, SPRING_BACK, SpeedMethod, Tissue, Wall};
 use control_core::event::{Fault, State};
@@ -217,7 +218,8 @@ fn a_needle_at_rest_sticks_and_a_sliding_one_is_rubbed_less() {
     }
 }
 
-/// To and fro by drawn ways and rests: never more comes back than the hold stores, 0.02 mJ, and a count of it for each turn.
+/// To and fro by drawn ways and rests: never more comes back than the hold stores, 0.02 mJ, and a
+/// count of it for each turn.
 #[test]
 fn friction_that_sticks_gives_nothing_of_its_own() {
     let mut c = started(&sticking());
@@ -378,7 +380,8 @@ fn no_count_under_torque_is_a_dead_encoder_but_rest_is_not() {
     // The fade-in comes first.
     assert!(matches!(trips[..], [(2_000..=4_100, Fault::EncoderFrozen)]), "{trips:?}");
 
-    // Let go in tissue, where friction holds a fraction of a newton, the needle rests as long as it likes.
+    // Let go in tissue, where friction holds a fraction of a newton, the needle rests as long as it
+    // likes.
     let mut c = started(&Config::commissioned_virtual());
     let mut at = 0.0;
     travel(&mut c, &mut at, 4.5, 10.0, |_| {});

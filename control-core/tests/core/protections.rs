@@ -1,5 +1,5 @@
-//! The protections that only show over time: the winding's heat and the energy of a stiff wall. Each is also seen to
-//! matter: without it the bound that it holds is broken.
+//! The protections that only show over time: the winding's heat and the energy of a stiff wall.
+//! Each is also seen to matter: without it the bound that it holds is broken.
 
 use control_core::config::{Config, FrictionLaw, Law, Layer, Parabola, SPRING_BACK, Tissue, Wall};
 use control_core::event::Limits;
@@ -41,7 +41,8 @@ fn tissue(layers: &[Layer], hold: f64) -> Config {
     let patient = Patient { law: Law::Jog(friction), layers, ..Patient::default() };
     let mut config = Config { patient, ..Config::commissioned_virtual() };
     config.device.limits.stiffness = Stiffness(q(7.0));
-    // What rings is faster than a hand: the protection against that is not the one that is looked at here.
+    // What rings is faster than a hand: the protection against that is not the one that is looked
+    // at here.
     config.device.limits.max_counts_per_tick = 200;
     config
 }
@@ -92,8 +93,9 @@ impl Needle {
     }
 }
 
-/// A needle against a wall at `wall_mm`, brought there at 20 mm/s, on which a hand leans over a second against `friction_n` and which
-/// is knocked after two: its deviation in the last half second of three, in µm, and how often the observer was in force.
+/// A needle against a wall at `wall_mm`, brought there at 20 mm/s, on which a hand leans over a
+/// second against `friction_n` and which is knocked after two: its deviation in the last half
+/// second of three, in µm, and how often the observer was in force.
 fn ringing(config: &Config, wall_mm: f64, friction_n: f64) -> (f64, usize) {
     let plan = config.plan().expect("a sound wall");
     let per_count_m = plan.mm_per_count().to_num::<f64>() / 1000.0;

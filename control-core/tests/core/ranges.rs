@@ -7,7 +7,7 @@ use control_core::units::{Damping, Millimetres, Newtons, Stiffness};
 use control_core::{Config, Refusal};
 use fixed::types::I8F24;
 
-/// The field that is refused; any other reason is told apart.
+/// The field that is refused; any other reason is distinguished.
 fn field(change: impl FnOnce(&mut Config)) -> Option<Field> {
     match refusal(change) {
         None => None,

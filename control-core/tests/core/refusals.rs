@@ -1,4 +1,5 @@
-//! Tests that a configuration which may not run is refused with the reason; the last value that may run is not.
+//! Tests that a configuration which may not run is refused with the reason; the last value that may
+//! run is not.
 
 use control_core::config::{FrictionLaw, Law, Layer, Parabola, SPRING_BACK, Tissue, Vessel, Wall};
 use control_core::plan::Field;
@@ -167,7 +168,8 @@ fn more_force_than_the_motor_has_is_refused() {
     };
     assert_eq!(with(2.5, 0.0), None);
     assert!(matches!(with(2.49, 0.0), Some(Refusal::TooStrong { layer: 1, .. })));
-    // Flat enough to meet the wall at the end of the travel, 8.8 mm of 0.01 N/mm lie above its 0.25 N.
+    // Flat enough to meet the wall at the end of the travel, 8.8 mm of 0.01 N/mm lie above its 0.25
+    // N.
     assert_eq!(with(3.39, 0.01), None);
     assert!(matches!(with(3.37, 0.01), Some(Refusal::TooStrong { layer: 1, .. })));
     // 1/16 N/mm: 0.8 N there, and 0.625 N at the end with the needle straight in.
@@ -266,7 +268,8 @@ fn a_patient_may_lower_the_devices_ceiling_but_not_raise_it() {
     assert_eq!(wants(2.87), None);
     let refused = wants(2.9);
     assert!(matches!(refused, Some(Refusal::AboveCeiling { .. })), "{refused:?}");
-    // The default tissue asks for up to 1.2 N at the end of the travel: what a patient may not ask for is told.
+    // The default tissue asks for up to 1.2 N at the end of the travel: what a patient may not ask
+    // for is told.
     assert!(matches!(wants(0.9), Some(Refusal::TooStrong { layer: 0, .. })));
     let mut config = Config::commissioned_virtual();
     config.patient.largest_force = Some(Newtons(q(2.0)));

@@ -77,7 +77,8 @@ fn torque(output: &TickOutput) -> f64 {
     (f64::from(output.dac.0) - f64::from(plan().zero_torque_code().0)) * 28.8 / 2047.0
 }
 
-/// The needle is held; what the servo pulls with shows where its reference is. The trembling of a count keeps the encoder alive.
+/// The needle is held; what the servo pulls with shows where its reference is. The trembling of a
+/// count keeps the encoder alive.
 #[test]
 fn a_segment_begins_on_the_tick_after_the_one_before() {
     // To 6 mm and back to 4; held there; from there to 9 and back to 8.
@@ -121,7 +122,8 @@ fn a_servo_takes_over_where_the_motor_was_left_without_one() {
     }
 }
 
-/// Its reference never passes its travel, which counts from where all of it began, and neither may the motor.
+/// Its reference never passes its travel, which counts from where all of it began, and neither may
+/// the motor.
 #[test]
 fn the_travel_counts_from_the_beginning_of_the_sequence() {
     let stroke = |travel: f64, duration_ms| Excitation {

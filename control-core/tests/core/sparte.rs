@@ -1,4 +1,5 @@
-//! The law of Paper 002 against its floating-point twin, written from the equations, and what a hand would notice of it.
+//! The law of Paper 002 against its floating-point twin, written from the equations, and what a
+//! hand would notice of it.
 
 use crate::needle::{Needle, force};
 use control_core::config::{
@@ -103,12 +104,13 @@ struct Twin {
     wall: f64,
     bristles: f64,
     last: f64,
-    /// Ticks so far, and whether something happened in the last one: the movement is looked at every 16 ticks, in the tenth of them,
-    /// unless there is more to do.
+    /// Ticks so far, and whether something happened in the last one: the movement is looked at
+    /// every 16 ticks, in the tenth of them, unless there is more to do.
     ticks: u32,
     is_busy: bool,
     has_stopped: bool,
-    /// Looks since the needle last went on in its direction; the furthest place; in 1, out −1, at rest 0.
+    /// Looks since the needle last went on in its direction; the furthest place; in 1, out −1, at
+    /// rest 0.
     still: u32,
     furthest: f64,
     direction: f64,
@@ -253,7 +255,8 @@ fn a_wall_gives_way_to_less_than_the_cutting_force() {
         }
     });
     assert!((before - 1.2).abs() < 0.02, "{before} N before the skin gave way");
-    // 0.6 of the fat's 1.5 N, for the tip is in it when the skin has sprung back; then cutting and friction come up.
+    // 0.6 of the fat's 1.5 N, for the tip is in it when the skin has sprung back; then cutting and
+    // friction come up.
     assert!((0.88..0.98).contains(&least), "{least} N after it");
     assert!(most > 1.5, "{most} N while cutting");
 }
@@ -332,7 +335,7 @@ fn the_fixture_holds_the_direction_up_to_its_largest_angle() {
     let (lateral, barriers) = turned(&mut needle, 250);
     assert!((lateral + 2.0).abs() < 0.02 && barriers == 1, "{lateral} N, {barriers} barriers");
     assert_eq!(turned(&mut needle, 190).1, 0, "not let go yet");
-    assert_eq!((turned(&mut needle, 100).1, turned(&mut needle, 250).1), (0, 1), "told again");
+    assert_eq!((turned(&mut needle, 100).1, turned(&mut needle, 250).1), (0, 1), "reported again");
 }
 
 #[test]

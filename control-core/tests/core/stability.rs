@@ -1,4 +1,5 @@
-//! The stiffness that a device bears: walls as stiff are quiet on it after a knock, and on those that bear less stiffer ones ring.
+//! The stiffness that a device bears: walls as stiff are quiet on it after a knock, and on those
+//! that bear less stiffer ones ring.
 
 use control_core::config::{
     Config, Device, FrictionLaw, Law, Layer, Mechanism, Parabola, SPRING_BACK, Tissue, Wall,
@@ -19,7 +20,8 @@ fn mechanism(dry_friction_n: f64, mass_g: f64, delay_us: u16) -> Mechanism {
     Mechanism { mass: Grams(q(mass_g)), dry_friction: Newtons(q(dry_friction_n)), delay_us }
 }
 
-/// A wall of `slope` N/mm on a device that is said to have `mechanism`, without the passivity observer.
+/// A wall of `slope` N/mm on a device that is said to have `mechanism`, without the passivity
+/// observer.
 fn wall(slope: f64, mechanism: Mechanism) -> Config {
     let parabola = |vertex: f64, compliance: f64, base: f64| Parabola {
         vertex: Millimetres(q(vertex)),
@@ -49,8 +51,9 @@ fn wall(slope: f64, mechanism: Mechanism) -> Config {
     Config { device, patient }
 }
 
-/// A needle of this mechanism that a hand leans on the wall with 0.15 N and that is knocked by 42 mm/s: its deviation in the
-/// last fifth of a second, in µm; `None` where the device took it for a fault.
+/// A needle of this mechanism that a hand leans on the wall with 0.15 N and that is knocked by 42
+/// mm/s: its deviation in the last fifth of a second, in µm; `None` where the device took it for a
+/// fault.
 fn deviation(config: &Config, needle: &Mechanism) -> Option<f64> {
     const STEP_US: usize = 10;
     let plan = config.plan().unwrap_or_else(|why| panic!("{why}"));

@@ -1,4 +1,5 @@
-//! The force table of Paper 000 against its floating-point twin, and what a hand would notice of it.
+//! The force table of Paper 000 against its floating-point twin, and what a hand would notice of
+//! it.
 
 use crate::needle::{Needle, force};
 use control_core::config::{ForceTable, Law, Layer, SpeedMethod, Tissue};
@@ -54,7 +55,8 @@ fn rising(depth: f64, speed: f64, angle: f64) -> f64 {
     0.1 * depth * (0.8 + 0.05 * speed) * (0.6 + 0.4 * angle)
 }
 
-/// The picture's surface moves in the tissue: the law counts depth from it, and from where it was at rest once the picture stands still.
+/// The picture's surface moves in the tissue: the law counts depth from it, and from where it was
+/// at rest once the picture stands still.
 #[test]
 fn depth_may_count_from_a_displaced_surface() {
     let config = config(table(rising));
@@ -103,7 +105,8 @@ fn a_steady_insertion_feels_the_tables_force() {
             }
         });
         assert!(worst < 0.02, "{speed} mm/s, {angle} mrad: off by {worst} N");
-        // The speed estimate wavers a little about 1 and 3 mm/s, between which no angle but the largest was measured.
+        // The speed estimate wavers a little about 1 and 3 mm/s, between which no angle but the
+        // largest was measured.
         assert!(
             if measured { angle == 1_047 && flags == 0 || angle < 1_047 } else { flags * 2 > inside },
             "{speed} mm/s, {angle} mrad: {flags} of {inside}"
@@ -251,7 +254,8 @@ fn twin(table: &ForceTable, depth: f64, speed: f64, mrad: f64) -> f64 {
     place(&depths, depth).iter().map(|(knot, weight)| weight * force(*knot)).sum()
 }
 
-/// Skin that gives way at 2 mm, a vessel at 4 mm that gives way at 5 mm; each a little deeper the faster the needle goes.
+/// Skin that gives way at 2 mm, a vessel at 4 mm that gives way at 5 mm; each a little deeper the
+/// faster the needle goes.
 fn that_gives_way() -> Config {
     let curve = [(0.0, 0.0), (2.0, 0.8), (2.3, 0.3), (4.0, 0.4), (5.0, 1.0), (5.3, 0.45), (15.0, 0.6)];
     let mut table = table(|_, _, _| 0.0);
@@ -337,7 +341,7 @@ fn in_its_track_the_needle_meets_no_layer_again() {
     for back_mm in [1.0, -1.0] {
         go(&mut needle, back_mm, 3.0);
         let again = go(&mut needle, 8.0, 3.0);
-        // What lies behind the last fall: 0.45 N and a little more at 3 mm/s, and how that grows over 2.5 mm.
+        // Behind the last fall: 0.45 N and a little more at 3 mm/s, and how that grows over 2.5 mm.
         assert_eq!(again.in_track, if back_mm < 0.0 { 0b11 } else { 0b10 });
         assert!(
             again.largest_n < 0.56 && again.gave_way.is_empty(),
@@ -352,7 +356,8 @@ fn in_its_track_the_needle_meets_no_layer_again() {
 
 #[test]
 fn beside_its_track_the_needle_meets_each_layer_again() {
-    // Turned by 0.25 rad, 1 mm beside the track after 4 mm: the skin's hole is the same, the vessel is whole.
+    // Turned by 0.25 rad, 1 mm beside the track after 4 mm: the skin's hole is the same, the vessel
+    // is whole.
     let mut needle = Needle::new(&that_gives_way(), Milliradians(1_571));
     go(&mut needle, 8.0, 3.0);
     go(&mut needle, 1.0, 3.0);
@@ -386,7 +391,7 @@ fn strongest_line(forces: &[f64]) -> f64 {
         let x = index as f64 - middle;
         (above + x * (force - mean), below + x * x)
     });
-    // A Hann window keeps what is left of the trend out of the lines.
+    // A Hann window keeps the rest of the trend out of the lines.
     let windowed: Vec<f64> = (forces.iter().enumerate())
         .map(|(index, force)| {
             let window = 1.0 - (std::f64::consts::TAU * (index as f64 + 0.5) / n).cos();

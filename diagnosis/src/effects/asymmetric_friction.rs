@@ -1,5 +1,6 @@
-//! Friction that differs with direction: `-(viscous_difference·|q̇| + coulomb_difference·|sgn q̇|)`. Where the nominal model has an
-//! offset the dry part is that offset, and only the viscous part can be told.
+//! Friction that differs with direction: `-(viscous_difference·|q̇| + coulomb_difference·|sgn
+//! q̇|)`. Where the nominal model has an offset the dry part is that offset, and only the viscous
+//! part can be told.
 
 use super::definition::{
     Allowed, EffectLaw, EffectReport, EffectSearch, FREE, Fitted, ForceLaw, Plain, Reported, Span,
@@ -50,7 +51,8 @@ impl EffectLaw for Defined {
         true
     }
     fn add_to_joint(&self, effect: &Effect, joint: &mut JointTerms) -> bool {
-        // Dry friction that differs with direction is a bias beside an even one, as long as the axis moves.
+        // Dry friction that differs with direction is a bias beside an even one, as long as the
+        // axis moves.
         joint.bias -= effect.coefficient("coulomb_difference");
         let difference = effect.coefficient("viscous_difference");
         if difference != 0.0 {

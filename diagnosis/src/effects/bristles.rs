@@ -1,8 +1,10 @@
-//! Bristles that bend before they slide: the hysteresis of friction just after a reversal, as a part of the sliding force.
+//! Bristles that bend before they slide: the hysteresis of friction just after a reversal, as a
+//! part of the sliding force.
 //!
-//! One length is Dahl's law (Dahl 1968, exponent 1), which LuGre (Canudas de Wit et al. 1995) dampens. Several, from short
-//! to long, are Maxwell-slip elements, each a share of the force that bends and then slides (Iwan 1966; Lampaert, Al-Bender
-//! and Swevers 2003): asperities of many sizes.
+//! One length is Dahl's law (Dahl 1968, exponent 1), which LuGre (Canudas de Wit et al. 1995)
+//! dampens. Several, from short to long, are Maxwell-slip elements, each a share of the force that
+//! bends and then slides (Iwan 1966; Lampaert, Al-Bender and Swevers 2003): asperities of many
+//! sizes.
 
 use super::Effect;
 use super::shape::shape;
@@ -41,8 +43,8 @@ impl Bristles {
         Self { elements: lengths(effect).into_iter().map(|length| (length, 0.0)).collect() }
     }
 
-    /// Returns their mean bend while `travel` passes, −1 to 1, and the difference of the bend between its end and its start;
-    /// 1 where all slide forward.
+    /// Returns their mean bend while `travel` passes, −1 to 1, and the difference of the bend
+    /// between its end and its start; 1 where all slide forward.
     pub(crate) fn bend(&mut self, travel: f64) -> (f64, f64) {
         let slides = self.elements.len() > 1;
         let (mut sum, mut more) = (0.0, 0.0);
@@ -87,7 +89,8 @@ mod tests {
     fn spread_bristles_slide_one_after_another_until_all_do() {
         let spread = [("deflection", 1.0), ("spread", 100.0)];
         let at = |travel: f64| bent_after(&mut bristles(&spread), travel);
-        // Lengths of 0.1 to 10: at 0.1 the shortest slides, the others are bent by 0.1 of their lengths' inverse.
+        // Lengths of 0.1 to 10: at 0.1 the shortest slides, the others are bent by 0.1 of their
+        // lengths' inverse.
         let lengths = lengths(&Effect::shaped(EffectName::PreslidingFriction, &spread));
         let expected = lengths.iter().map(|length| (0.1 / length).min(1.0)).sum::<f64>() / 6.0;
         assert!((at(0.1) - expected).abs() < 1e-3, "{} instead of {expected}", at(0.1));

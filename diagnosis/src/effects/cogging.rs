@@ -1,4 +1,5 @@
-//! Torque periodic in the angle, independent of the command: teeth and poles, or a screw. Its orders are sought in the residual.
+//! Torque periodic in the angle, independent of the command: teeth and poles, or a screw. Its
+//! orders are sought in the residual.
 
 use super::definition::{EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Reported, Span};
 use super::shape::ShapeKey;

@@ -3,12 +3,15 @@
 use super::Effect;
 use std::collections::VecDeque;
 
-/// An effect on the command, with its state. Steps may be of any length: each answer is the mean over its step.
+/// An effect on the command, with its state. Steps may be of any length: each answer is the mean
+/// over its step.
 #[derive(Debug, Clone)]
 pub(crate) enum CommandLaw {
-    /// Small commands do nothing; `shift` takes the width off larger ones, otherwise they pass whole.
+    /// Small commands do nothing; `shift` takes the width off larger ones, otherwise they pass
+    /// whole.
     Deadband { half_width: f64, shift: bool },
-    /// Commands beyond the limit are held at it. With `softness` s > 0 they approach it: `u/(1 + |u/limit|^(1/s))^s`.
+    /// Commands beyond the limit are held at it. With `softness` s > 0 they approach it:
+    /// `u/(1 + |u/limit|^(1/s))^s`.
     Clip { limit: f64, softness: f64 },
     /// A transport delay, s; the queue holds (length, command) of what is under way.
     Delay { delay: f64, queue: VecDeque<(f64, f64)>, waiting: f64 },

@@ -1,4 +1,5 @@
-//! A drive that clips below its declared limit, at once or softly, as amplifiers near their supply do.
+//! A drive that clips below its declared limit, at once or softly, as amplifiers near their supply
+//! do.
 
 use super::definition::{EffectLaw, EffectReport, EffectSearch, Fitted, Movable, Reported, Shown, Span};
 use super::joint_terms::JointTerms;

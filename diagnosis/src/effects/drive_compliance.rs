@@ -24,7 +24,8 @@ impl ForceLaw for DriveComplianceLaw {
     fn names(&self) -> Vec<String> {
         vec!["inertia_ratio".into()]
     }
-    /// Mean over the step of s²/(s² + 2ζωs + ω²) applied to a held force, per unit of the ratio of load to motor inertia.
+    /// Mean over the step of s²/(s² + 2ζωs + ω²) applied to a held force, per unit of the ratio of
+    /// load to motor inertia.
     fn terms(&mut self, state: &State, _velocity: f64, out: &mut [f64]) {
         if state.dt <= 0.0 {
             out[0] = 0.0;

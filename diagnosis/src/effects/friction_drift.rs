@@ -1,4 +1,5 @@
-//! Friction that changes over the time of the recording, as it warms up: `-(coulomb·sgn(q̇) + viscous·q̇)·(1 - exp(-t/time_constant))`.
+//! Friction that changes over the time of the recording, as it warms up: `-(coulomb·sgn(q̇) +
+//! viscous·q̇)·(1 - exp(-t/time_constant))`.
 
 use super::definition::{
     Allowed, EffectLaw, EffectReport, EffectSearch, FREE, Fitted, ForceLaw, Movable, Reported, Shown, Span,
@@ -75,7 +76,8 @@ impl EffectSearch for Defined {
         vec![("time_constant", 0.02 * span.duration, 5.0 * span.duration)]
     }
     fn limits(&self, term: usize, allowed: &Allowed) -> (f64, f64) {
-        // What warms changes both frictions alike; how much of the friction as it is may go or come is judged where that is known.
+        // What warms changes both frictions alike; how much of the friction as it is may go or come
+        // is judged where that is known.
         let most = match (term, allowed.viscous, allowed.dry) {
             (1.., Some(viscous), _) => viscous,
             (_, _, Some(_)) => allowed.dry_by_uncertainty,
@@ -108,6 +110,9 @@ impl EffectReport for Defined {
             Reported::new("coulomb", fitted.scaled((change, sd)), fitted.force)
         };
         vec![size, Reported::new("time_constant", fitted.shape("time_constant"), "s")]
+    }
+    fn is_size(&self, value: &str) -> bool {
+        !value.starts_with("period") && value != "time_constant"
     }
     fn form_sd(&self, value: &str) -> f64 {
         if value == "time_constant" { 0.06 } else { 0.04 }

@@ -1,7 +1,9 @@
-//! A torque constant that changes over the recording, as magnets and winding heat: `change·drive·h`. Either h follows the time alone,
-//! `1 - exp(-t/time_constant)`, or, with `mean_square`, the copper loss: `time_constant·dh/dt = u²/mean_square - h` with u the effective
-//! command and h zero at the start, the first-order thermal model of a motor (one thermal resistance, one capacity). With
-//! `at_once_s` the load changes at once, which has no name and speaks only against others.
+//! A torque constant that changes over the recording, as magnets and winding heat:
+//! `change·drive·h`. Either h follows the time alone, `1 - exp(-t/time_constant)`, or, with
+//! `mean_square`, the copper loss: `time_constant·dh/dt = u²/mean_square - h` with u the effective
+//! command and h zero at the start, the first-order thermal model of a motor (one thermal
+//! resistance, one capacity). With `at_once_s` the load changes at once, which has no name and
+//! speaks only against others.
 
 use super::definition::{
     Allowed, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Movable, Reported, Shown, Span, Unnamed,
@@ -17,7 +19,8 @@ shape! {
         time_constant: needed,
         /// Time at which the drift comes all at once, s.
         at_once_s: (f64::INFINITY),
-        /// Square of the command under which the heat settles at one; none where it follows the time alone.
+        /// Square of the command under which the heat settles at one; none where it follows the
+        /// time alone.
         mean_square: optional,
     }
 }
@@ -70,6 +73,9 @@ impl EffectLaw for Defined {
     fn scales_drive(&self) -> bool {
         true
     }
+    fn reads_command(&self, effect: &Effect) -> bool {
+        Shape::of(effect).mean_square.is_some()
+    }
     fn drifts(&self) -> bool {
         true
     }
@@ -102,7 +108,8 @@ impl EffectSearch for Defined {
         vec![("time_constant", 0.02 * span.duration, 5.0 * span.duration)]
     }
     fn limits(&self, _term: usize, allowed: &Allowed) -> (f64, f64) {
-        // At most this part of the smallest gain that the rig allows: a drive that drifts to nothing is no drift.
+        // At most this part of the smallest gain that the rig allows: a drive that drifts to
+        // nothing is no drift.
         let least = 0.6 * allowed.gain.abs() / allowed.gain_reach;
         (-least, least)
     }
@@ -135,6 +142,9 @@ impl EffectReport for Defined {
             Reported::new("change", (change / fitted.ratio, (sd / fitted.ratio).abs()), "1"),
             Reported::new("time_constant", fitted.shape("time_constant"), "s"),
         ]
+    }
+    fn is_size(&self, value: &str) -> bool {
+        !value.starts_with("period") && value != "time_constant"
     }
     fn form_sd(&self, value: &str) -> f64 {
         if value == "time_constant" { 0.06 } else { 0.04 }

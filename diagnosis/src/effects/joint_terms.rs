@@ -1,4 +1,5 @@
-//! A machine in the terms of other simulators: one joint and its motor. Each effect adds what such terms can say of it.
+//! A machine in the terms of other simulators: one joint and its motor. Each effect adds what such
+//! terms can say of it.
 
 /// A joint and its motor; N·m and rad, or N and m.
 #[derive(Debug, Clone, Default)]

@@ -1,4 +1,5 @@
-//! The law of an effect on force or sensor: its terms, linear in the coefficients, with internal state; and what several share.
+//! The law of an effect on force or sensor: its terms, linear in the coefficients, with internal
+//! state; and what several share.
 
 use super::definition::ForceLaw;
 use super::{Effect, EffectName, State};
@@ -13,7 +14,8 @@ pub(super) fn sign(x: f64) -> f64 {
     if x == 0.0 { 0.0 } else { x.signum() }
 }
 
-/// An effect with its internal state. The force is the sum of coefficient times term; sensor effects give travel instead.
+/// An effect with its internal state. The force is the sum of coefficient times term; sensor
+/// effects give travel instead.
 #[derive(Debug)]
 pub struct Law {
     name: EffectName,
@@ -50,7 +52,8 @@ impl Law {
         self.name.definition().is_dry()
     }
 
-    /// The part of a force without a name that holds an axis at rest, per unit of its coefficient, N·m or N.
+    /// The part of a force without a name that holds an axis at rest, per unit of its coefficient,
+    /// N·m or N.
     pub(crate) fn dry_part(&self, state: &State) -> f64 {
         self.law.dry_part(state)
     }

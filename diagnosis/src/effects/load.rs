@@ -1,11 +1,14 @@
-//! The part of the machine beyond a gap or a grip: a second mass that is seen only by what the motor feels of it.
+//! The part of the machine beyond a gap or a grip: a second mass that is seen only by what the
+//! motor feels of it.
 //!
-//! With J = Jm + Jl, p = Jl/J and r = Jl/Jm, a rigid machine accelerates by d − f, where d = D/J and f = F/J against the
-//! motion. A load that brakes itself by a, reached through a force T, adds r·(d − y − (f − a) − e/r), where
-//! y = T/(p·J) and e = E/J of the forces E that act on the load. The motor's lead w over its load follows
-//! w″ = (1 + r)·(d − y − (f − a) − e/r) while both go the same way, and the load's friction turns with the load.
-//! Through a gap T is a stiff, damped contact; through a grip T rises with the creep w′ up to a ceiling. Both are driven by
-//! the command, so that little noise of the measured motion enters, and bounded, so that nothing drifts.
+//! With J = Jm + Jl, p = Jl/J and r = Jl/Jm, a rigid machine accelerates by d − f, where d = D/J
+//! and f = F/J against the motion. A load that brakes itself by a, reached through a force T, adds
+//! r·(d − y − (f − a) − e/r), where y = T/(p·J) and e = E/J of the forces E that act on the load.
+//! The motor's lead w over its load follows w″ = (1 + r)·(d − y − (f − a) − e/r) while both go the
+//! same way, and the load's friction turns with the load. Through a gap T is a stiff, damped
+//! contact; through a grip T rises with the creep w′ up to a ceiling. Both are driven by the
+//! command, so that little noise of the measured motion enters, and bounded, so that nothing
+//! drifts.
 
 use super::shape::shape;
 use super::{Effect, State};
@@ -31,6 +34,48 @@ shape! {
     }
 }
 
+/// Values of the whole machine that the law of a joint uses, all per inertia: per unit of command
+/// and of the measured load, by dry and viscous friction, and by the weight.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct WholeMachine {
+    pub(crate) per_command: f64,
+    pub(crate) dry: f64,
+    pub(crate) viscous: f64,
+    pub(crate) per_force: f64,
+    pub(crate) weight: f64,
+}
+
+impl WholeMachine {
+    /// The values of a shape.
+    pub(crate) fn shape(&self) -> [(&'static str, f64); 5] {
+        let Self { per_command, dry, viscous, per_force, weight } = *self;
+        [
+            ("per_command", per_command),
+            ("dry", dry),
+            ("viscous", viscous),
+            ("per_force", per_force),
+            ("weight", weight),
+        ]
+    }
+}
+
+impl Effect {
+    /// True if its law is built on the rest of the machine.
+    pub(crate) fn is_joint(&self) -> bool {
+        self.name.formula().is_none() && self.shape.contains_key("per_command")
+    }
+
+    /// Builds the law of a joint on another machine. The force at which a grip lets go stays as it
+    /// is.
+    pub(crate) fn put_on(&mut self, machine: &WholeMachine) {
+        let scale = self.shape["per_command"] / machine.per_command;
+        if let Some(limit) = self.shape.get_mut("limit") {
+            *limit *= scale;
+        }
+        self.shape.extend(machine.shape().map(|(key, value)| (key.to_owned(), value)));
+    }
+}
+
 /// The load's motion against the motor's.
 #[derive(Debug, Clone)]
 pub(crate) struct Load {
@@ -40,7 +85,8 @@ pub(crate) struct Load {
     contact: f64,
     /// Load inertia over motor inertia.
     ratio: f64,
-    /// Acceleration of the whole machine per unit of command, and its deceleration by dry and viscous friction.
+    /// Acceleration of the whole machine per unit of command, and its deceleration by dry and
+    /// viscous friction.
     per_command: f64,
     dry: f64,
     viscous: f64,
@@ -49,7 +95,8 @@ pub(crate) struct Load {
     weight: f64,
     /// The last tilt, rad, and its sine.
     tilt: (f64, f64),
-    /// Deceleration of the load by its own dry friction, and its friction over that of the whole machine, per inertia.
+    /// Deceleration of the load by its own dry friction, and its friction over that of the whole
+    /// machine, per inertia.
     coast: f64,
     share: f64,
     /// Command that the grip carries at its ceiling, in the command's unit.
@@ -93,7 +140,8 @@ impl Load {
         Self { half: 0.5 * gap, contact: TAU * contact_hz, ..Self::of(Machine::of(effect)) }
     }
 
-    /// A load held by a grip that carries `limit`, in the command's unit, and slips at twice the creep `creep`, rad/s or m/s.
+    /// A load held by a grip that carries `limit`, in the command's unit, and slips at twice the
+    /// creep `creep`, rad/s or m/s.
     pub(super) fn in_grip(effect: &Effect, limit: f64, creep: f64) -> Self {
         Self { limit, creep, ..Self::of(Machine::of(effect)) }
     }
@@ -118,7 +166,8 @@ impl Load {
         }
     }
 
-    /// Command that drives the motor alone, beyond what the flanks of the gap carry, mean over the step.
+    /// Command that drives the motor alone, beyond what the flanks of the gap carry, mean over the
+    /// step.
     pub(crate) fn through_gap(&mut self, s: &State) -> f64 {
         let drive = s.command * self.per_command;
         // The first command finds the flank that pushes.
@@ -142,7 +191,8 @@ impl Load {
         (sum / steps - missed) / self.per_command
     }
 
-    /// Command that drives the motor alone, beyond what the grip carries: little while it creeps, much while it slips.
+    /// Command that drives the motor alone, beyond what the grip carries: little while it creeps,
+    /// much while it slips.
     pub(crate) fn by_grip(&mut self, s: &State) -> f64 {
         let drive = s.command * self.per_command;
         let most = self.limit * self.per_command;
@@ -192,8 +242,8 @@ impl Load {
     }
 }
 
-/// Part of its ceiling that a rolling contact carries at a creep, as a part of half the creep at which it slips (Carter
-/// 1926: the zone that sticks shrinks as the creep grows).
+/// Part of its ceiling that a rolling contact carries at a creep, as a part of half the creep at
+/// which it slips (Carter 1926: the zone that sticks shrinks as the creep grows).
 fn carried(creep: f64) -> f64 {
     if creep.abs() < 2.0 { creep - 0.25 * creep * creep.abs() } else { creep.signum() }
 }
@@ -250,7 +300,8 @@ mod tests {
 
     #[test]
     fn what_pulls_at_the_load_goes_through_the_grip() {
-        // A load that is held back by F needs F more through the grip: it lets go although the command is small.
+        // A load that is held back by F needs F more through the grip: it lets go although the
+        // command is small.
         let held_back = settled(0.35, -2.0);
         let pulled = -2.0 * 20.0 / 100.0;
         assert!((held_back - (0.35 - 0.5 - pulled / RATIO)).abs() < 0.05, "{held_back}");

@@ -1,5 +1,6 @@
-//! Dry friction that grows with the measured external load: `-coefficient·|force|·sgn(q̇)`; with `of_drive` the load is the drive's
-//! own force, as a gear loses it, which has no name and speaks only against others.
+//! Dry friction that grows with the measured external load: `-coefficient·|force|·sgn(q̇)`; with
+//! `of_drive` the load is the drive's own force, as a gear loses it, which has no name and speaks
+//! only against others.
 
 use super::definition::{
     Allowed, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, POSITIVE, Reported, Span, Unnamed,
@@ -39,6 +40,12 @@ pub(super) struct Defined;
 impl EffectLaw for Defined {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         Some(Box::new(LoadDependentFrictionLaw { of_drive: Shape::of(effect).of_drive }))
+    }
+    fn reads_command(&self, effect: &Effect) -> bool {
+        effect.shape.contains_key("of_drive")
+    }
+    fn follows_drive(&self, effect: &Effect) -> bool {
+        Shape::of(effect).of_drive
     }
     fn shape_keys(&self) -> &'static [&'static [ShapeKey]] {
         &[Shape::KEYS]

@@ -7,8 +7,8 @@ use super::shape::ShapeKey;
 use super::waves::{self, Waves};
 use super::{Effect, EffectName, Subsystem, Variable};
 
-/// Part of a turn of the motor over which once a turn is told from a slope, and of the axis over which gravity bends from a
-/// spring's straight line.
+/// Part of a turn of the motor over which once a turn is distinguished from a slope, and of the
+/// axis over which gravity bends from a spring's straight line.
 pub(super) const LEAST_TURNS: f64 = 0.6;
 const LEAST_OF_AXIS: f64 = 0.15;
 

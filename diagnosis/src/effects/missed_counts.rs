@@ -1,4 +1,5 @@
-//! Counts that the encoder loses permanently: steps of what it reads. The steps are found before any effect is.
+//! Counts that the encoder loses permanently: steps of what it reads. The steps are found before
+//! any effect is.
 
 use super::definition::{Allowed, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Reported, Span};
 use super::shape::{Missing, ShapeKey};

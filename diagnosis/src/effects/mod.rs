@@ -1,8 +1,9 @@
-//! One model per effect, written once: the diagnosis evaluates its terms along a recording, the simulator runs it forward.
+//! One model per effect, written once: the diagnosis evaluates its terms along a recording, the
+//! simulator runs it forward.
 //!
-//! [`Effect`] is data (what a patched rig holds), [`Law`] is the same effect with its internal state. What an effect is stands in
-//! a file of its own, as a `Definition`; to add one, write its file and a line in the registry below. Nothing here
-//! may know how an effect is found.
+//! [`Effect`] is data (what a patched rig holds), [`Law`] is the same effect with its internal
+//! state. Each effect has a file of its own with its `Definition`; to add one, write its file and a
+//! line in the registry below. Nothing here may know how an effect is found.
 
 mod bristles;
 mod command;
@@ -23,6 +24,7 @@ pub(crate) use formula::read_effects;
 pub use formula::{Formula, FormulaId, FormulaText};
 pub use law::Law;
 pub(crate) use law::{sinc, wave_mean};
+pub(crate) use load::WholeMachine;
 pub use state::State;
 pub use table::Table;
 pub use variable::Variable;
@@ -146,7 +148,8 @@ impl fmt::Display for EffectName {
     }
 }
 
-/// An effect with its numbers: `shape` enters non-linearly (speeds, orders, delays), `coefficients` linearly.
+/// An effect with its numbers: `shape` enters non-linearly (speeds, orders, delays), `coefficients`
+/// linearly.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "InFile", into = "InFile")]
 pub struct Effect {
@@ -245,7 +248,8 @@ impl Effect {
         effect
     }
 
-    /// One value of the shape. A missing one is what the effect's file declares, and not a number where that declares nothing.
+    /// One value of the shape. A missing one is what the effect's file declares, and not a number
+    /// where that declares nothing.
     pub fn value(&self, key: &str) -> f64 {
         let declared = || match self.shape_key(key).map(|known| known.missing) {
             Some(Missing::Is(value)) => value,
@@ -264,13 +268,45 @@ impl Effect {
         self.shape.get("turn").copied()
     }
 
-    /// One coefficient; where it is missing, zero, and one of a table, which is a force as it stands.
+    /// One coefficient; where it is missing, zero, and one of a table, which is a force by itself.
     pub fn coefficient(&self, key: &str) -> f64 {
         let missing = if self.name == EffectName::Table { 1.0 } else { 0.0 };
         self.coefficients.get(key).copied().unwrap_or(missing)
     }
 
-    /// The spatial frequencies of a periodic effect, rad per unit of travel, with the suffix of their coefficients.
+    /// An effect that is made of whole orders of a turn, rad or m.
+    pub(crate) fn of_orders(name: EffectName, turn: f64, orders: &[f64]) -> Self {
+        let mut effect = Self::shaped(name, &[("turn", turn)]);
+        effect.shape.extend(orders.iter().map(|order| (format!("order_{order}"), *order)));
+        effect
+    }
+
+    /// An effect that is made of waves of these lengths, rad or m, the shortest first.
+    pub(crate) fn of_periods(name: EffectName, periods: &[f64]) -> Self {
+        let mut effect = Self::shaped(name, &[]);
+        let numbered = periods.iter().enumerate();
+        effect.shape.extend(numbered.map(|(i, period)| (format!("period_{}", i + 1), *period)));
+        effect
+    }
+
+    /// The values of the shape that a fit may have slightly wrong: not the travel of a turn, and
+    /// not the waves along it.
+    pub fn uncertain_values(&self) -> impl Iterator<Item = (&str, f64)> {
+        let is_of_waves =
+            |key: &str| key == "turn" || key.starts_with("order_") || key.starts_with("period_");
+        let values = self.shape.iter().map(|(key, value)| (key.as_str(), *value));
+        values.filter(move |(key, value)| !is_of_waves(key) && *value != 0.0)
+    }
+
+    /// Returns the largest command that does nothing, in units of command, where a dead band shifts
+    /// what is beyond it; `None` for every other effect.
+    pub fn shifted_dead_band(&self) -> Option<f64> {
+        let is_one = self.name == EffectName::CommandDeadband;
+        (is_one && self.value("shift") != 0.0).then(|| self.value("half_width"))
+    }
+
+    /// The spatial frequencies of a periodic effect, rad per unit of travel, with the suffix of
+    /// their coefficients.
     pub fn waves(&self) -> Vec<(String, f64)> {
         let turn = self.turn().unwrap_or(std::f64::consts::TAU);
         let mut waves: Vec<(String, f64)> = Vec::new();

@@ -1,10 +1,10 @@
-//! Damping that changes along the travel: `-Σ legendre_k·P_k(q)·q̇`; with `of_inertia` it is the inertia that follows the travel, which
-//! has no name and speaks only against others.
+//! Damping that changes along the travel: `-Σ legendre_k·P_k(q)·q̇`; with `of_inertia` it is the
+//! inertia that follows the travel, which has no name and speaks only against others.
 
 use super::definition::{EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Reported, Span, Unnamed};
 use super::law::legendre;
-use super::travel_profile::{self, Profile};
 use super::shape::{ShapeKey, shape};
+use super::travel_profile::{self, Profile};
 use super::{Effect, EffectName, State, Subsystem, experiments};
 
 #[derive(Debug, Clone)]
@@ -14,7 +14,8 @@ struct PositionDependentDampingLaw {
 }
 
 impl PositionDependentDampingLaw {
-    /// Terms of an inertia J(q) in addition to a constant one, by Lagrange's equation: J′v²/2 and its part of the acceleration.
+    /// Terms of an inertia J(q) in addition to a constant one, by Lagrange's equation: J′v²/2 and
+    /// its part of the acceleration.
     fn inertia(&self, state: &State, out: &mut [f64]) {
         let step = 1e-3 * 0.5 * (self.profile.high - self.profile.low);
         let mut beyond = vec![0.0; out.len()];
@@ -73,6 +74,9 @@ impl EffectLaw for Defined {
 }
 
 impl EffectSearch for Defined {
+    fn profile_values(&self, effect: &Effect) -> f64 {
+        travel_profile::degree(effect)
+    }
     fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
         travel_profile::grid(name, span)
     }
@@ -80,7 +84,7 @@ impl EffectSearch for Defined {
         travel_profile::freedom(effect)
     }
     fn unnamed(&self, name: EffectName, fitted: Option<&Effect>, span: &Span) -> Vec<Unnamed> {
-        // All of them are told by an acceleration that changes with the travel.
+        // All of them show by an acceleration that changes with the travel.
         let alike = [name, EffectName::EncoderEccentricity, EffectName::MassImbalance];
         if fitted.is_some_and(|effect| !alike.contains(&effect.name)) {
             return Vec::new();

@@ -39,6 +39,9 @@ impl EffectLaw for Defined {
 }
 
 impl EffectSearch for Defined {
+    fn profile_values(&self, effect: &Effect) -> f64 {
+        travel_profile::degree(effect)
+    }
     fn needs_dry(&self) -> bool {
         true
     }

@@ -1,5 +1,5 @@
-//! A spring along the travel, a bending needle or elastic tissue: `-stiffness·(q - from)`, or only beyond `from`; with `fades_s` it
-//! creeps, which has no name and speaks only against others.
+//! A spring along the travel, a bending needle or elastic tissue: `-stiffness·(q - from)`, or only
+//! beyond `from`; with `fades_s` it creeps, which has no name and speaks only against others.
 
 use super::definition::{
     Allowed, EffectLaw, EffectReport, EffectSearch, FREE, Fitted, ForceLaw, Movable, POSITIVE, Plain,
@@ -17,7 +17,8 @@ shape! {
         from: 0.0,
         /// True if it pulls beyond that place only.
         one_sided: flag,
-        /// True if a force is there at the start, because it is not known where the spring is at rest.
+        /// True if a force is there at the start, because it is not known where the spring is at
+        /// rest.
         preload: flag,
         /// Time in which the force fades while the spring stays bent, s.
         fades_s: (f64::INFINITY),
@@ -79,12 +80,14 @@ impl EffectLaw for Defined {
 
 impl EffectSearch for Defined {
     fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
-        // A rig without an offset has no other term for a spring that is not at rest where the recording starts. Where the
-        // inertia is hardly known one more term explains slow motion as well as forces in balance do.
+        // A rig without an offset has no other term for a spring that is not at rest where the
+        // recording starts. Where the inertia is hardly known one more term explains slow motion as
+        // well as forces in balance do.
         let preload = f64::from(u8::from(!span.rig.has_offset && !span.rig.is_anchored));
         let mut out = vec![Effect::shaped(name, &[("from", 0.0), ("preload", preload)])];
         if !span.rig.has_stroke {
-            // Where each recording starts is not known, and only a spring that never goes slack is the same from anywhere.
+            // Where each recording starts is not known, and only a spring that never goes slack is
+            // the same from anywhere.
             return out;
         }
         for part in [0.25, 0.5, 0.75] {

@@ -1,4 +1,5 @@
-//! Elastic bristles before sliding: the hysteresis just after a reversal (Dahl 1968; LuGre, Canudas de Wit et al. 1995).
+//! Elastic bristles before sliding: the hysteresis just after a reversal (Dahl 1968; LuGre, Canudas
+//! de Wit et al. 1995).
 
 use super::bristles::{Bristles, Shape, lengths};
 use super::definition::{
@@ -10,7 +11,8 @@ use super::shape::ShapeKey;
 use super::{Effect, EffectName, State, Subsystem};
 use crate::numerics::golden_section::logarithmic;
 
-/// Longest over shortest of the lengths over which bristles bend, where they are not all alike: asperities of many sizes.
+/// Longest over shortest of the lengths over which bristles bend, where they are not all alike:
+/// asperities of many sizes.
 const SPREAD: f64 = 10.0;
 
 #[derive(Debug, Clone)]

@@ -75,7 +75,8 @@ impl EffectSearch for Defined {
     }
     fn movable(&self, effect: &Effect, span: &Span) -> Vec<Movable> {
         let Machine { dry, .. } = Machine::of(effect);
-        // Beyond the largest command: what the load's own friction takes a grip carries too. One that holds even then never slips.
+        // Beyond the largest command: what the load's own friction takes a grip carries too. One
+        // that holds even then never slips.
         let friction = span.rig.dry / span.rig.per_command.abs();
         vec![
             ("limit", 0.01 * span.command, span.command + friction.min(span.command)),
@@ -85,7 +86,8 @@ impl EffectSearch for Defined {
         ]
     }
     fn is_possible(&self, effect: &Effect) -> bool {
-        // The load's own friction is no more than the machine's, and a grip holds its load against it, or it never held.
+        // The load's own friction is no more than the machine's, and a grip holds its load against
+        // it, or it never held.
         let Machine { dry, per_command, coast, .. } = Machine::of(effect);
         own_friction(effect) <= MOST_OF_DRY * dry
             && Shape::of(effect).limit * per_command.abs() >= HOLDS * coast

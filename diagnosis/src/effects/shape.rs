@@ -1,7 +1,7 @@
 //! The values of an effect that enter non-linearly: speeds, lengths, delays, orders.
 //!
-//! Each effect declares its own once, with what a missing one is. Its law reads them as a struct; searches, which move them by name,
-//! read [`crate::effects::Effect::shape`].
+//! Each effect declares its own once, with what a missing one is. Its law reads them as a struct;
+//! searches, which move them by name, read [`crate::effects::Effect::shape`].
 
 /// The value that holds where a rig gives none.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -43,8 +43,9 @@ impl ShapeKey {
     }
 }
 
-/// Declares the values of an effect as a struct with the constructor `of(&Effect)` and the constant `KEYS`. The type of a value says
-/// what holds where it is missing: `needed` (a rig must give it), `flag` (no), `optional` (none), or a number.
+/// Declares the values of an effect as a struct with the constructor `of(&Effect)` and the constant
+/// `KEYS`. The type of a value says what holds where it is missing: `needed` (a rig must give it),
+/// `flag` (no), `optional` (none), or a number.
 macro_rules! shape {
     ($(#[$about:meta])* struct $Name:ident { $($(#[$doc:meta])* $key:ident: $missing:tt,)* }) => {
         $(#[$about])*

@@ -9,7 +9,8 @@ pub struct State {
     pub velocity: f64,
     /// rad/s² or m/s²; asked only by what no plant has.
     pub acceleration: f64,
-    /// True if the sign of the velocity is unknown: friction is a reaction then and not in the model.
+    /// True if the sign of the velocity is unknown: friction is a reaction then and not in the
+    /// model.
     pub rest: bool,
     /// Force that the command asks for: gain · effective command, N·m or N.
     pub drive: f64,

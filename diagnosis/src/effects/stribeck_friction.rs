@@ -1,4 +1,5 @@
-//! Friction that falls as speed rises from zero: `-peak·exp(-(|q̇|/speed)^exponent)·sgn(q̇)` (Stribeck 1902; Bo and Pavelescu 1982).
+//! Friction that falls as speed rises from zero: `-peak·exp(-(|q̇|/speed)^exponent)·sgn(q̇)`
+//! (Stribeck 1902; Bo and Pavelescu 1982).
 
 use super::definition::{
     Allowed, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Movable, POSITIVE, Reported, Shown,

@@ -6,7 +6,8 @@ use super::{Effect, EffectName, State, Subsystem, Variable};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
-/// A force over a grid, straight between its places and level beyond its ends. A place given twice is a jump.
+/// A force over a grid, straight between its places and level beyond its ends. A place given twice
+/// is a jump.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Table {
     /// The variables: one or two.
@@ -84,7 +85,8 @@ struct TableLaw {
 }
 
 impl TableLaw {
-    /// Values of the variables; `velocity` in place of the state's, whose sign may be asked for at rest.
+    /// Values of the variables; `velocity` in place of the state's, whose sign may be asked for at
+    /// rest.
     fn values(&self, s: &State, velocity: f64) -> [f64; 2] {
         let of = |variable: &Variable| match variable {
             Variable::Speed => velocity,

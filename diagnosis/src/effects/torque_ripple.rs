@@ -1,4 +1,5 @@
-//! Torque periodic in the angle and proportional to the command: commutation. Its orders are sought in the residual.
+//! Torque periodic in the angle and proportional to the command: commutation. Its orders are sought
+//! in the residual.
 
 use super::definition::{Allowed, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Reported, Span};
 use super::shape::ShapeKey;
@@ -30,8 +31,8 @@ impl EffectSearch for Defined {
         Vec::new()
     }
     fn limits(&self, _term: usize, allowed: &Allowed) -> (f64, f64) {
-        // A commutation may lose most of the torque at some angle, and the part is one of the gain as it is; where that is
-        // hardly known, a ripple as large explains what cogging does.
+        // A commutation may lose most of the torque at some angle, and the part is one of the gain
+        // as it is; where that is hardly known, a ripple as large explains what cogging does.
         let part = if allowed.is_anchored { 0.45 } else { 0.9 * allowed.gain_reach };
         (-part * allowed.gain.abs(), part * allowed.gain.abs())
     }

@@ -1,12 +1,13 @@
-//! A profile along the travel: Legendre polynomials over what the recordings span, shared by friction and damping that follow it.
+//! A profile along the travel: Legendre polynomials over what the recordings span, shared by
+//! friction and damping that follow it.
 
 use super::definition::{Fitted, Span};
 use super::law::legendre;
 use super::shape::shape;
 use super::{Effect, EffectName};
 
-/// Degrees of the polynomial that a profile along the travel may have: a slope or bend, a step or bump, and one that is
-/// narrow beside the travel.
+/// Degrees of the polynomial that a profile along the travel may have: a slope or bend, a step or
+/// bump, and one that is narrow beside the travel.
 const DEGREES: [f64; 3] = [3.0, 6.0, 12.0];
 
 shape! {
@@ -54,8 +55,12 @@ pub(super) fn grid(name: EffectName, span: &Span) -> Vec<Effect> {
     DEGREES.map(of).to_vec()
 }
 
+pub(super) fn degree(effect: &Effect) -> f64 {
+    Shape::of(effect).degree
+}
+
 pub(super) fn freedom(effect: &Effect) -> usize {
-    Shape::of(effect).degree as usize
+    degree(effect) as usize
 }
 
 /// Largest less smallest of the fitted polynomial over the travel.

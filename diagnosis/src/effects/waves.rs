@@ -1,4 +1,5 @@
-//! Waves along the travel: means of cosine and sine over a step, shared by all that repeats with the turn.
+//! Waves along the travel: means of cosine and sine over a step, shared by all that repeats with
+//! the turn.
 
 use super::definition::{Fitted, ForceLaw, Reported, sized};
 use super::law::wave_mean;
@@ -6,7 +7,8 @@ use super::shape::{Missing, ShapeKey};
 use super::{Effect, State};
 use std::f64::consts::TAU;
 
-/// The keys of every effect that is made of waves: the travel of a turn, orders of it, or periods where no turn is known, rad or m.
+/// The keys of every effect that is made of waves: the travel of a turn, orders of it, or periods
+/// where no turn is known, rad or m.
 pub(super) const KEYS: &[ShapeKey] = &[
     ShapeKey::new("turn", Missing::Optional),
     ShapeKey::new("order_", Missing::Numbered),
@@ -63,7 +65,8 @@ pub(super) fn amplitude(fitted: &Fitted) -> (f64, f64) {
     sized(&[fitted.term(0), fitted.term(1)])
 }
 
-/// Amplitudes, periods where no turn is known, and the root mean square of all; relative to the drive where that is asked.
+/// Amplitudes, periods where no turn is known, and the root mean square of all; relative to the
+/// drive where that is asked.
 pub(super) fn report(fitted: &Fitted, is_relative: bool) -> Vec<Reported> {
     let mut waves: Vec<f64> = fitted.effect.waves().into_iter().map(|(_, wave)| wave).collect();
     if waves.is_empty() {

@@ -1,5 +1,5 @@
-//! A recording in blocks with what is known of it so far: the motion that a model sees in it, jumps of its reading, and the
-//! blocks that may not judge.
+//! A recording in blocks with what is known of it so far: the motion that a model sees in it, jumps
+//! of its reading, and the blocks that may not judge.
 
 use crate::estimation::blocks::{Blocks, Rows};
 use crate::estimation::filter::Observed;
@@ -186,8 +186,9 @@ impl BlockedRecording {
         sum / m as f64 * count
     }
 
-    /// True if dry friction may have stopped the axis for a part of a block: it is that slow there, and faster on both sides, but not
-    /// so much faster that it is driven through a reversal with twice the friction.
+    /// True if dry friction may have stopped the axis for a part of a block: it is that slow there,
+    /// and faster on both sides, but not so much faster that it is driven through a reversal with
+    /// twice the friction.
     pub(crate) fn stops_within(&self, block: usize) -> bool {
         let near = [block.saturating_sub(2), (block + 2).min(self.block_count() - 1)];
         let [before, after] = near.map(|other| self.motion.v[other]);

@@ -1,8 +1,9 @@
-//! A recording cut into blocks of rows, so that a filter can run over it fast and without differencing.
+//! A recording cut into blocks of rows, so that a filter can run over it fast and without
+//! differencing.
 //!
-//! A block's position is the mean of its rows; an input is held row by row and enters as what it does to velocity, to
-//! position and to the block's mean, so that time stamps are used as they are and nothing is resampled. Nothing here
-//! changes once a recording is cut.
+//! A block's position is the mean of its rows; an input is held row by row and enters as what it
+//! does to velocity, to position and to the block's mean, so that time stamps are used as they are
+//! and nothing is resampled. Nothing here changes once a recording is cut.
 
 use crate::estimation::input::Input;
 use crate::estimation::reading_lag::LagStep;
@@ -11,7 +12,8 @@ use crate::estimation::slices::Slices;
 use crate::io::recording::Recording;
 use crate::io::rig::Rig;
 
-/// The data of a recording, block by block. All vectors have one entry per block unless said otherwise.
+/// The data of a recording, block by block. All vectors have one entry per block unless said
+/// otherwise.
 #[derive(Debug, Clone)]
 pub(crate) struct Blocks {
     pub(crate) file: String,
@@ -19,7 +21,8 @@ pub(crate) struct Blocks {
     pub(crate) lead_s: f64,
     /// Travel per turn of the motor where it is known, rad or m.
     pub(crate) turn: Option<f64>,
-    /// The encoder's position at zero travel, rad or m; it means something where the encoder is absolute.
+    /// The encoder's position at zero travel, rad or m; it means something where the encoder is
+    /// absolute.
     pub(crate) origin: f64,
     /// Start of each block since the first row, s.
     pub(crate) start: Vec<f64>,
@@ -28,8 +31,8 @@ pub(crate) struct Blocks {
     /// Mean over the rows of the time since the block's start, s, and of half its square, s².
     pub(crate) tau1: Vec<f64>,
     pub(crate) tau2: Vec<f64>,
-    /// Time constant of a filter of the reading that the rig declares, s, and how the reading lags over each block; empty
-    /// where it declares none.
+    /// Time constant of a filter of the reading that the rig declares, s, and how the reading lags
+    /// over each block; empty where it declares none.
     pub(crate) filter_s: Option<f64>,
     pub(crate) reading_lag: Vec<LagStep>,
     /// Mean reading since the first row, rad or m.
@@ -51,7 +54,8 @@ pub(crate) struct Blocks {
 pub(crate) struct Rows {
     /// Rows per block.
     pub(crate) per_block: usize,
-    /// Time of each row since the first, and the length for which its command is held (one fewer than rows), s.
+    /// Time of each row since the first, and the length for which its command is held (one fewer
+    /// than rows), s.
     pub(crate) time: Vec<f64>,
     pub(crate) hold: Vec<f64>,
     /// Command per row.
@@ -60,7 +64,8 @@ pub(crate) struct Rows {
     pub(crate) command_input: Input,
     /// Change of the command's input per row that it acts late.
     pub(crate) lateness_input: Input,
-    /// Change of the command's input per part of it that acts in the row before and as much in the row after.
+    /// Change of the command's input per part of it that acts in the row before and as much in the
+    /// row after.
     pub(crate) spread_input: Input,
     /// Rows taken together for a resonance or a contact, and for a grip.
     pub(crate) of_contact: Slices,
@@ -77,7 +82,8 @@ const FASTEST_BLOCKS_HZ: f64 = 400.0;
 /// Shortest segment, s, and how many segments a recording is cut into at most.
 const SEGMENT_S: f64 = 0.2;
 const SEGMENTS: f64 = 60.0;
-/// Rows closer than this are taken together for a second mass, s: its resonances are below 200 Hz, and a grip has none.
+/// Rows closer than this are taken together for a second mass, s: its resonances are below 200 Hz,
+/// and a grip has none.
 const CONTACT_STEP_S: f64 = 6e-4;
 const GRIP_STEP_S: f64 = 1e-3;
 
@@ -159,7 +165,8 @@ fn as_known(rig: &Rig, command: impl Iterator<Item = f64>, hold: &[f64]) -> Vec<
 }
 
 impl Blocks {
-    /// Cuts a recording into the blocks of its rows; `lead_s` was left out of its file before the first row.
+    /// Cuts a recording into the blocks of its rows; `lead_s` was left out of its file before the
+    /// first row.
     pub(crate) fn new(recording: &Recording, rig: &Rig, rows: &Rows, lead_s: f64) -> Self {
         let scale = 1.0 / rig.encoder.counts_per_unit;
         let (n, m) = (rows.blocks(), rows.per_block);
@@ -195,7 +202,8 @@ impl Blocks {
         blocks
     }
 
-    /// Adds the block of rows `first` to `end`; one count is `scale`, and a reading has `noise` counts of noise.
+    /// Adds the block of rows `first` to `end`; one count is `scale`, and a reading has `noise`
+    /// counts of noise.
     fn push(
         &mut self,
         counts: &[f64],
@@ -229,7 +237,8 @@ impl Blocks {
             .push(scale * scale * (1.0 / 12.0 / (1.0 + moved.min(count - 1.0)) + noise * noise / count));
     }
 
-    /// Inflates the errors of slow counts: if a count lasts several blocks, its error is the same in all of them and counts once.
+    /// Inflates the errors of slow counts: if a count lasts several blocks, its error is the same
+    /// in all of them and counts once.
     fn inflate_where_slow(&mut self, count: f64) {
         let n = self.span.len();
         let reach = 20.min(n / 4).max(1);

@@ -1,5 +1,5 @@
-//! The covariance of the filter's state and the gains that follow from it: they depend on the noise and on when rows were read, and on no
-//! reading.
+//! The covariance of the filter's state and the gains that follow from it: they depend on the noise
+//! and on when rows were read, and on no reading.
 
 use crate::estimation::reading_lag::LagStep;
 
@@ -16,7 +16,8 @@ pub(crate) struct Noise {
     pub(crate) tau: f64,
     /// White acceleration at rest, where friction is a reaction, (rad/s²)²·s.
     pub(crate) rest: f64,
-    /// Variance that a fit adds to the sensor's, as a multiple too: it hides what is faster than a band.
+    /// Variance that a fit adds to the sensor's, as a multiple too: it hides what is faster than a
+    /// band.
     pub(crate) blur: f64,
 }
 
@@ -62,11 +63,12 @@ pub(super) struct Gain {
     pub(super) rho: f64,
 }
 
-/// A covariance of the states position, speed, disturbance and, as the fourth where the rig declares a filter in the
-/// reading, the lag of the reading.
+/// A covariance of the states position, speed, disturbance and, as the fourth where the rig
+/// declares a filter in the reading, the lag of the reading.
 pub(super) type Covariance<const N: usize> = [[f64; N]; N];
 
-/// One block: what the state becomes over it, what of the state its mean reading shows, and the noise that it adds.
+/// One block: what the state becomes over it, what of the state its mean reading shows, and the
+/// noise that it adds.
 pub(super) struct Step<const N: usize> {
     pub(super) transition: [[f64; N]; N],
     pub(super) seen: [f64; N],
@@ -105,15 +107,16 @@ impl<const N: usize> Step<N> {
     }
 }
 
-/// Variance of the position at the start over that of one reading: practically unknown, and far from rounding errors.
+/// Variance of the position at the start over that of one reading: practically unknown, and far
+/// from rounding errors.
 const DIFFUSE: f64 = 1e4;
 
 pub(super) fn initial<const N: usize>(track: &Observed, noise: &Noise) -> Covariance<N> {
     let reach = track.z.iter().fold(0.0_f64, |m, z| m.max(z.abs())).max(1e-12);
     let duration = track.start[track.blocks() - 1].max(1e-3);
     let speed = 100.0 * reach / duration.min(1.0);
-    // Where the reading's own error is the larger, the start has to be unsure against that: an estimator may count in errors
-    // of one, whatever the unit of length.
+    // Where the reading's own error is the larger, the start has to be unsure against that: an
+    // estimator may count in errors of one, whatever the unit of length.
     let error = DIFFUSE * noise.reading() * track.quantum[0];
     let span = track.span[0].max(1e-9);
     let mut p = [[0.0; N]; N];
@@ -188,8 +191,8 @@ pub(super) fn settling(track: &Observed) -> usize {
     if track.reading_lag.is_empty() { 3 } else { 4 }
 }
 
-/// Runs the covariance over a recording and hands on the gain at each block; returns −½ Σ ln S. `rhos` are the parts of the disturbance
-/// that are left after each block, where they are known.
+/// Runs the covariance over a recording and hands on the gain at each block; returns −½ Σ ln S.
+/// `rhos` are the parts of the disturbance that are left after each block, where they are known.
 pub(super) fn covariances<const N: usize>(
     track: &Observed,
     noise: &Noise,

@@ -3,7 +3,8 @@
 use crate::effects::{CommandLaw, Effect};
 use crate::estimation::blocked_recording::BlockedRecording;
 
-/// The effective commands of recordings under effects of which the last acts on the command; none where it does not.
+/// The effective commands of recordings under effects of which the last acts on the command; none
+/// where it does not.
 pub(crate) fn effective_commands(tracks: &[BlockedRecording], effects: &[Effect]) -> Option<Vec<Vec<f64>>> {
     CommandLaw::new(effects.last()?)?;
     tracks.iter().map(|track| effective_command(track, effects)).collect()
@@ -23,8 +24,9 @@ pub(crate) fn effective_command(track: &BlockedRecording, effects: &[Effect]) ->
     Some(holdout.map(|(u, h)| laws.iter_mut().fold(*u, |u, law| law.step(u, *h))).collect())
 }
 
-/// Mean over each row of commands that arrive late, as [`CommandLaw::Delay`] makes it: differences of the command's
-/// integral, which cost no queue. A negative `delay`, s, is a command that arrives early.
+/// Mean over each row of commands that arrive late, as [`CommandLaw::Delay`] makes it: differences
+/// of the command's integral, which cost no queue. A negative `delay`, s, is a command that arrives
+/// early.
 pub(crate) fn delayed(command: &[f64], hold: &[f64], delay: f64) -> Vec<f64> {
     // The row that holds what arrives now, when it began, and the integral until then.
     let (mut row, mut began, mut before) = (0, 0.0, 0.0);

@@ -1,10 +1,11 @@
-//! The filter behind everything: position, velocity, a disturbance acceleration that comes and goes and, where the rig declares
-//! a filter in the reading, how far that lags.
+//! The filter behind everything: position, velocity, a disturbance acceleration that comes and goes
+//! and, where the rig declares a filter in the reading, how far that lags.
 //!
-//! Innovations are linear in data and inputs, so a model that is linear in its coefficients becomes ordinary least squares
-//! on whitened innovations: weighted by what the sensor and the disturbance leave to be known, never differenced.
-//! Because an innovation only holds what the past did not tell, a command that reacts to a disturbance is not mistaken
-//! for its cause (prediction-error identification in closed loop, Ljung 1999, chapter 13).
+//! Innovations are linear in data and inputs, so a model that is linear in its coefficients becomes
+//! ordinary least squares on whitened innovations: weighted by what the sensor and the disturbance
+//! leave to be known, never differenced. Because an innovation only holds what the past did not
+//! tell, a command that reacts to a disturbance is not mistaken for its cause (prediction-error
+//! identification in closed loop, Ljung 1999, chapter 13).
 
 use crate::estimation::covariance::{Gain, covariances, settling};
 pub(crate) use crate::estimation::covariance::{Noise, Observed};
@@ -25,8 +26,8 @@ pub(crate) struct Gains {
     pub(crate) log_det: f64,
 }
 
-/// A stretch whose mean square innovation is above this counts by the logarithm of it: one bad stretch (an impact, a
-/// transient that nothing here models) must not decide over the rest.
+/// A stretch whose mean square innovation is above this counts by the logarithm of it: one bad
+/// stretch (an impact, a transient that nothing here models) must not decide over the rest.
 const ROBUST_FROM: f64 = 1.5;
 
 /// The cost of a mean square innovation, and the weight that goes with it.
@@ -41,8 +42,9 @@ pub(crate) fn robust_loss(mean_square: f64) -> (f64, f64) {
 /// Inputs that go through the filter together.
 const SIDE_BY_SIDE: usize = 4;
 
-/// The filter's state on its way through a recording, for `L` inputs side by side. Each step of one input waits for the step
-/// before it; several keep the processor busy meanwhile, and each gives the same bits as alone.
+/// The filter's state on its way through a recording, for `L` inputs side by side. Each step of one
+/// input waits for the step before it; several keep the processor busy meanwhile, and each gives
+/// the same bits as alone.
 struct Walk<'a, const L: usize> {
     track: &'a Observed<'a>,
     settling: usize,
@@ -94,7 +96,8 @@ impl<'a, const L: usize> Walk<'a, L> {
     }
 }
 
-/// Whitened innovations of the data under a model's total input, with −½ Σ ln S: as by [`Gains`], in one pass that keeps no gains.
+/// Whitened innovations of the data under a model's total input, with −½ Σ ln S: as by [`Gains`],
+/// in one pass that keeps no gains.
 pub(super) fn innovations(track: &Observed, noise: &Noise, rhos: &[f64], total: &Total) -> (Vec<f64>, f64) {
     let mut innovations = Vec::with_capacity(track.blocks());
     let mut walk = Walk::<1>::new(track, track.z[0]);
@@ -140,7 +143,8 @@ impl Gains {
         (0..track.blocks()).map(|j| walk.step(j, &self.at(j), track.z[j], &total.at(j))[0]).collect()
     }
 
-    /// Returns the response of the whitened innovations to one unit of an input, with the sign of a regressor.
+    /// Returns the response of the whitened innovations to one unit of an input, with the sign of a
+    /// regressor.
     pub(crate) fn response(&self, track: &Observed, input: &Input) -> Vec<f64> {
         let [response] = self.responses_of(track, [input]);
         response

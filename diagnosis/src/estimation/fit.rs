@@ -1,4 +1,5 @@
-//! The linear fit of a model to several recordings in the domain of whitened innovations, counted per segment of time.
+//! The linear fit of a model to several recordings in the domain of whitened innovations, counted
+//! per segment of time.
 
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::filter::{Gains, Noise, robust_loss};
@@ -118,7 +119,8 @@ impl Prepared {
     }
 }
 
-/// Returns the price that a model with lost counts pays for the jumps found in each segment of a recording, in log-likelihood.
+/// Returns the price that a model with lost counts pays for the jumps found in each segment of a
+/// recording, in log-likelihood.
 fn surcharges(track: &BlockedRecording, model: &Model) -> Vec<f64> {
     let has_jumps = model.effects.iter().any(|effect| effect.name.definition().is_of_jumps());
     let paid = |bounds: &[usize]| match track.jumps.price.get(bounds[0]..bounds[1]) {
@@ -172,7 +174,8 @@ impl Fit {
         Self::of(prepared)
     }
 
-    /// Solves for recordings already prepared, and again with stretches that are worse than the noise weighed down.
+    /// Solves for recordings already prepared, and again with stretches that are worse than the
+    /// noise weighed down.
     fn of(prepared: Vec<Prepared>) -> Self {
         let mut fit = Self::solve(prepared);
         for _ in 0..2 {

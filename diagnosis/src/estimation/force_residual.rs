@@ -1,7 +1,8 @@
-//! The force residual that people see: one estimator, the same for the nominal, the refitted and the patched model.
+//! The force residual that people see: one estimator, the same for the nominal, the refitted and
+//! the patched model.
 //!
-//! A fixed-interval smoother whose disturbance state is a random walk is a low-pass of sixth order without phase, exact
-//! under uneven time stamps; its bandwidth is what the report states.
+//! A fixed-interval smoother whose disturbance state is a random walk is a low-pass of sixth order
+//! without phase, exact under uneven time stamps; its bandwidth is what the report states.
 
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::filter::{Noise, Observed};
@@ -12,9 +13,10 @@ use std::f64::consts::TAU;
 /// Largest bandwidth, Hz.
 const WIDEST_HZ: f64 = 50.0;
 const NARROWEST_HZ: f64 = 3.0;
-/// Periods at the end of the band after which the estimator has forgotten all but a few thousandths.
+/// Periods at the end of the band after which the estimator has forgotten all but a few
+/// thousandths.
 const KERNEL_PERIODS: f64 = 2.0;
-/// Part of the force that sensor noise may be in it: more hides what is left out.
+/// Part of the force that sensor noise may be in it: more hides the missing physics.
 const NOISY: f64 = 0.01;
 
 /// The estimator for some recordings.
@@ -24,7 +26,8 @@ pub(crate) struct Estimator {
 }
 
 impl Estimator {
-    /// Chooses the bandwidth at which sensor noise stays below [`NOISY`] of the acceleration `scale`.
+    /// Chooses the bandwidth at which sensor noise stays below [`NOISY`] of the acceleration
+    /// `scale`.
     pub(crate) fn new(tracks: &[BlockedRecording], noise: &Noise, scale: f64) -> Self {
         let slowest = tracks.iter().map(BlockedRecording::block_rate).fold(f64::INFINITY, f64::min);
         let mut hz = WIDEST_HZ.min(0.25 * slowest);
@@ -53,7 +56,8 @@ impl Estimator {
 }
 
 impl Estimator {
-    /// Returns the answer of the estimator to one block of acceleration, with that block in the middle; it sums to one.
+    /// Returns the answer of the estimator to one block of acceleration, with that block in the
+    /// middle; it sums to one.
     pub(crate) fn kernel(&self, track: &BlockedRecording) -> Vec<f64> {
         let (n, middle) = (track.block_count(), track.block_count() / 2);
         let h = track.blocks.span[middle];
@@ -69,7 +73,8 @@ impl Estimator {
     }
 }
 
-/// Returns the error of an acceleration estimate of some bandwidth that the sensor alone causes, root mean square.
+/// Returns the error of an acceleration estimate of some bandwidth that the sensor alone causes,
+/// root mean square.
 fn sensor_noise(tracks: &[BlockedRecording], noise: &Noise, hz: f64) -> f64 {
     // ∫ ω⁴/(1 + (ω/ωc)⁶)² df over both sides = ωc⁵/(2π) · 2 · π/36 · 1/sin(5π/6)
     let integral = (TAU * hz).powi(5) / TAU * 2.0 * (std::f64::consts::PI / 36.0)
@@ -77,7 +82,8 @@ fn sensor_noise(tracks: &[BlockedRecording], noise: &Noise, hz: f64) -> f64 {
     (noise.sensor * counting_density(tracks, hz) * integral).sqrt()
 }
 
-/// Density of the error of reading whole counts at the end of a band, rad²·s or m²·s, the mean over recordings.
+/// Density of the error of reading whole counts at the end of a band, rad²·s or m²·s, the mean over
+/// recordings.
 fn counting_density(tracks: &[BlockedRecording], hz: f64) -> f64 {
     let density = |track: &BlockedRecording| {
         let mut quantum: Vec<f64> = track.blocks.quantum.clone();
@@ -90,8 +96,8 @@ fn counting_density(tracks: &[BlockedRecording], hz: f64) -> f64 {
 }
 
 impl Estimator {
-    /// Blocks that move, of which the model knows something, and that are further from rest than the estimator reaches: at
-    /// rest friction is a reaction, and a low-pass would carry it over.
+    /// Blocks that move, of which the model knows something, and that are further from rest than
+    /// the estimator reaches: at rest friction is a reaction, and a low-pass would carry it over.
     pub(crate) fn moving(&self, track: &BlockedRecording) -> Vec<bool> {
         let reach = (0.4 / self.bandwidth_hz * track.block_rate()).ceil() as usize;
         let n = track.block_count();
@@ -117,8 +123,9 @@ impl Estimator {
         out
     }
 
-    /// Returns the residual that reading whole counts alone causes on rows that move, root mean square: the smoothed motion is
-    /// read anew and goes through the estimator. Slow motion turns it into a sawtooth that no formula for white noise has.
+    /// Returns the residual that reading whole counts alone causes on rows that move, root mean
+    /// square: the smoothed motion is read anew and goes through the estimator. Slow motion turns
+    /// it into a sawtooth that no formula for white noise has.
     pub(crate) fn counting(&self, tracks: &[BlockedRecording], noise: &Noise, count: f64) -> f64 {
         let errors: Vec<Vec<f64>> = tracks
             .iter()
@@ -131,14 +138,16 @@ impl Estimator {
         self.rms(&errors, tracks) * noise.sensor.sqrt().max(1.0)
     }
 
-    /// Returns noise under which a fit weighs forces within the band alike and those beyond it the less the faster they are.
+    /// Returns noise under which a fit weighs forces within the band alike and those beyond it the
+    /// less the faster they are.
     pub(crate) fn weighing(&self, tracks: &[BlockedRecording], noise: &Noise) -> Noise {
         let hz = self.bandwidth_hz;
         let sensor = noise.white / (counting_density(tracks, hz) * (TAU * hz).powi(4));
         Noise { blur: (sensor - noise.sensor).max(0.0), ..*noise }
     }
 
-    /// Returns the residual that a white disturbance alone causes, as an acceleration, root mean square.
+    /// Returns the residual that a white disturbance alone causes, as an acceleration, root mean
+    /// square.
     pub(crate) fn white(&self, noise: &Noise) -> f64 {
         // ∫ 1/(1 + (f/fc)⁶)² df over both sides = 2·fc · 5/6 · (π/6)/sin(π/6)
         let sixth = std::f64::consts::PI / 6.0;
@@ -194,7 +203,8 @@ mod tests {
         assert!((rms / said - 1.0).abs() < 0.05, "{rms} instead of {said}");
     }
 
-    /// An axis with a load on a spring: within the band it moves with the load, and far beyond it alone.
+    /// An axis with a load on a spring: within the band it moves with the load, and far beyond it
+    /// alone.
     #[test]
     fn a_fit_in_the_band_knows_nothing_of_faster_motion() {
         let (dt, slow_hz, fast_hz) = (1e-3, 2.0, 60.0);

@@ -1,5 +1,5 @@
-//! Results that a recording keeps from one fit to the next, because a search fits thousands of models that differ in one effect. Each use
-//! checks that they still hold.
+//! Results that a recording keeps from one fit to the next, because a search fits thousands of
+//! models that differ in one effect. Each use checks that they still hold.
 
 use crate::effects::Effect;
 use crate::estimation::blocks::Rows;
@@ -17,13 +17,14 @@ const MOST_BLOCKS: usize = 40_000;
 /// The motion that a model sees in a recording, block by block.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct BlockMotion {
-    /// Position and velocity at the middle of each block: from the smoother where the recording is fitted, from the filter where it judges.
+    /// Position and velocity at the middle of each block: from the smoother where the recording is
+    /// fitted, from the filter where it judges.
     pub(crate) x: Vec<f64>,
     pub(crate) v: Vec<f64>,
     /// Blocks where the axis rests or the sign of its speed is not known.
     pub(crate) rest: Vec<bool>,
-    /// Blocks in which the filter allows any force: at rest, and at a reversal, because the row in which friction changes its sign and
-    /// what a solver makes of that row are in no recording.
+    /// Blocks in which the filter allows any force: at rest, and at a reversal, because the row in
+    /// which friction changes its sign and what a solver makes of that row are in no recording.
     pub(crate) any_force: Vec<bool>,
     /// Blocks in the middle of a rest: friction is a reaction there and cancels every input.
     pub(crate) stuck: Vec<bool>,
@@ -41,7 +42,8 @@ pub(crate) struct Side {
 }
 
 impl BlockMotion {
-    /// Returns both sides of a reversal within a block; none where the axis does not turn back there, or rests.
+    /// Returns both sides of a reversal within a block; none where the axis does not turn back
+    /// there, or rests.
     pub(crate) fn sides(&self, block: usize) -> Option<[Side; 2]> {
         let last = self.v.len() - 1;
         let near = [block.saturating_sub(1), (block + 1).min(last)];
@@ -115,7 +117,8 @@ impl Kept {
         new
     }
 
-    /// The inputs of an effect in a motion and under the command of some rows: as they are known, or else new.
+    /// The inputs of an effect in a motion and under the command of some rows: as they are known,
+    /// or else new.
     pub(super) fn inputs(
         &self,
         (motion, rows): (&BlockMotion, &Arc<Rows>),

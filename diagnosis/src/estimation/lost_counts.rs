@@ -1,4 +1,5 @@
-//! Lost counts: jumps of what the encoder reads that no force could bring about, found in the innovations.
+//! Lost counts: jumps of what the encoder reads that no force could bring about, found in the
+//! innovations.
 
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::filter::Gains;
@@ -18,7 +19,8 @@ pub(crate) struct Asked {
 }
 
 impl Asked {
-    /// Before it is known that counts get lost: more than any jump that noise makes in a recording, and more than one.
+    /// Before it is known that counts get lost: more than any jump that noise makes in a recording,
+    /// and more than one.
     pub(crate) const UNKNOWN: Self = Self { gain: 14.0, least: 0.7, fewest: 2 };
     /// The prior once counts are known to get lost, in one block of some hundreds.
     pub(crate) const KNOWN: Self = Self { gain: 8.0, least: 0.55, fewest: 1 };
@@ -38,9 +40,10 @@ const ROUNDS: usize = 3;
 pub(crate) struct Losses {
     /// Travel lost so far per block, rad or m; zero everywhere where too few jumps are seen.
     pub(crate) lost: Vec<f64>,
-    /// The price of the jump that begins in a block, nats. When counts get lost and how many nobody can tell beforehand, so every
-    /// jump is found in the very recording that it explains; less this price its gain is at most what the recording is likelier
-    /// where each block is as likely to hold it and its size is drawn from a normal distribution of `spread` (Laplace's
+    /// The price of the jump that begins in a block, nats. When counts get lost and how many nobody
+    /// can tell beforehand, so every jump is found in the very recording that it explains; less
+    /// this price its gain is at most what the recording is likelier where each block is as likely
+    /// to hold it and its size is drawn from a normal distribution of `spread` (Laplace's
     /// approximation of the marginal likelihood), which noise cannot gain by on the mean.
     pub(crate) price: Vec<f64>,
     /// Sizes of the jumps, rad or m.
@@ -53,8 +56,8 @@ pub(crate) fn spread_of(sizes: &[f64], count: f64) -> f64 {
     square.sqrt().max(count)
 }
 
-/// Finds the counts that a recording lost in the residual of a fit of it alone without jumps; `spread` is the size of jumps where
-/// other recordings tell, rad or m.
+/// Finds the counts that a recording lost in the residual of a fit of it alone without jumps;
+/// `spread` is the size of jumps where other recordings tell, rad or m.
 pub(crate) fn find(
     track: &BlockedRecording,
     alone: &Fit,
@@ -98,15 +101,15 @@ pub(crate) fn find(
 
 /// Time before a jump in which the command is looked at, s: a belt or a joint gives way at once.
 const JUST_BEFORE_S: f64 = 0.02;
-/// Mean rank of the command's change before jumps, among all moving blocks, above which jumps follow the command; by chance
-/// it is a half.
+/// Mean rank of the command's change before jumps, among all moving blocks, above which jumps
+/// follow the command; by chance it is a half.
 const FOLLOWS: f64 = 0.8;
 /// Fewest jumps whose places say something, and standard errors by which they must.
 const TELLING: usize = 6;
 const SURELY: f64 = 3.0;
 
-/// True if jumps come just after the command has changed: what is lost is lost whatever the drive does, what a spring in the
-/// drive takes up is not.
+/// True if jumps come just after the command has changed: what is lost is lost whatever the drive
+/// does, what a spring in the drive takes up is not.
 fn follows_command(track: &BlockedRecording, jumps: &[Jump]) -> bool {
     if jumps.len() < TELLING {
         return false;
@@ -175,8 +178,8 @@ fn peaks(track: &BlockedRecording, gains: &Gains, residual: &[f64], least_gain: 
     apart
 }
 
-/// A jump within a block shows in part in it and whole in the next one: a response from some block on and the same from the
-/// next one on, neither against the other.
+/// A jump within a block shows in part in it and whole in the next one: a response from some block
+/// on and the same from the next one on, neither against the other.
 struct Pair {
     first: f64,
     second: f64,
@@ -251,8 +254,8 @@ impl Jump {
     }
 }
 
-/// Fits all sizes at once, looks again where within its block each jump is, drops those that do not stand, and fits again;
-/// gives what is left of the residual.
+/// Fits all sizes at once, looks again where within its block each jump is, drops those that do not
+/// stand, and fits again; gives the rest of the residual.
 fn settle(jumps: &mut Vec<Jump>, residual: &[f64], stands: impl Fn(&Jump) -> bool) -> Vec<f64> {
     let left = fit_sizes(jumps, residual);
     for jump in jumps.iter_mut() {
@@ -316,7 +319,8 @@ mod tests {
 
     const ROWS_PER_S: f64 = 5000.0;
 
-    /// Returns the counts found to be lost, and the blocks' starts, s, of an axis whose reading moves by `counts`.
+    /// Returns the counts found to be lost, and the blocks' starts, s, of an axis whose reading
+    /// moves by `counts`.
     fn lost(counts: impl Fn(f64) -> f64, asked: Asked) -> (Vec<f64>, Vec<f64>) {
         let time_s: Vec<f64> = (0..10_000).map(|row| f64::from(row) / ROWS_PER_S).collect();
         let recording = Recording {
@@ -355,7 +359,8 @@ mod tests {
         assert!(!any(lost(impact, Asked::KNOWN)));
     }
 
-    /// The price is what keeps a search of the very recording that is judged from gaining by chance.
+    /// The price is what keeps a search of the very recording that is judged from gaining by
+    /// chance.
     #[test]
     fn jumps_that_chance_makes_cost_more_than_they_gain() {
         let any = Asked { gain: 2.0, least: 0.0, fewest: 1 };

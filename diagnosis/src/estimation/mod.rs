@@ -1,4 +1,5 @@
-//! From recordings and a model of fixed structure to coefficients, noise and motion. Nothing here chooses between effects.
+//! From recordings and a model of fixed structure to coefficients, noise and motion. Nothing here
+//! chooses between effects.
 
 pub(crate) mod blocked_recording;
 pub(crate) mod blocks;

@@ -1,4 +1,5 @@
-//! A candidate model as columns of a linear regression: the nominal terms, each recording's offset, and effects.
+//! A candidate model as columns of a linear regression: the nominal terms, each recording's offset,
+//! and effects.
 
 use crate::effects::Effect;
 use crate::effects::definition::NominalTerm;
@@ -19,12 +20,13 @@ pub(crate) struct Column {
     pub(crate) prior: Prior,
 }
 
-/// A model: the nominal terms plus effects whose shapes are fixed and whose coefficients are fitted.
+/// A model: the nominal terms plus effects whose shapes are fixed and whose coefficients are
+/// fitted.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Model {
     pub(crate) effects: Vec<Effect>,
-    /// Acceleration by the force that is there all the time, for a second mass to take up, per fitted recording; where there is
-    /// none the track's own.
+    /// Acceleration by the force that is there all the time, for a second mass to take up, per
+    /// fitted recording; where there is none the track's own.
     pub(crate) bias: Vec<f64>,
 }
 

@@ -1,4 +1,5 @@
-//! The size of sensor noise and disturbance: maximum likelihood of the innovations, by a deterministic pattern search.
+//! The size of sensor noise and disturbance: maximum likelihood of the innovations, by a
+//! deterministic pattern search.
 
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::covariance::rhos;
@@ -8,7 +9,8 @@ use crate::numerics::parallel;
 use std::ops::Range;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Blocks that the search looks at per recording: more would not change the answer by its own uncertainty.
+/// Blocks that the search looks at per recording: more would not change the answer by its own
+/// uncertainty.
 const LOOKED_AT: usize = 8000;
 
 /// Blocks that are forgiven together where they are worse than the noise.
@@ -22,7 +24,8 @@ struct Excerpt<'a> {
     start: Vec<f64>,
     z: Vec<f64>,
     total: Total,
-    /// A correlation time, s, and the parts of the disturbance that are left after each block then: most trials of a search keep it.
+    /// A correlation time, s, and the parts of the disturbance that are left after each block then:
+    /// most trials of a search keep it.
     left: Mutex<(f64, Arc<Vec<f64>>)>,
 }
 
@@ -91,16 +94,19 @@ fn log_likelihood(parts: &[Excerpt], noise: &Noise) -> f64 {
 /// The assumed disturbance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Colour {
-    /// White force: every frequency of the band counts the same, as in a plain force error. Ranks effects.
+    /// White force: every frequency of the band counts the same, as in a plain force error. Ranks
+    /// effects.
     White,
     /// White force and a slow disturbance: what wanders by itself proves nothing. Tests effects.
     Slow,
 }
 
-/// Bounds of the correlation time of the disturbance, s: longer would be an offset, shorter would be white.
+/// Bounds of the correlation time of the disturbance, s: longer would be an offset, shorter would
+/// be white.
 const TAU: (f64, f64) = (0.004, 0.1);
 
-/// The noise under which the innovations of these recordings are the most likely, starting from `from`.
+/// The noise under which the innovations of these recordings are the most likely, starting from
+/// `from`.
 pub(crate) fn estimate(
     tracks: &[BlockedRecording],
     totals: &[Total],
@@ -140,7 +146,8 @@ pub(crate) fn estimate(
     noise_at(&pattern_search(at, (lower, upper), moved_values, &value))
 }
 
-/// Searches for the largest value within bounds by a pattern search; only the first `moved_values` values move.
+/// Searches for the largest value within bounds by a pattern search; only the first `moved_values`
+/// values move.
 fn pattern_search(
     mut at: [f64; 4],
     (lower, upper): ([f64; 4], [f64; 4]),
@@ -180,7 +187,8 @@ fn pattern_search(
     at
 }
 
-/// Returns the start of the search before anything is known; `scale` is the acceleration that the command makes.
+/// Returns the start of the search before anything is known; `scale` is the acceleration that the
+/// command makes.
 pub(crate) fn guess(tracks: &[BlockedRecording], scale: f64) -> Noise {
     let span = tracks[0].blocks.span.iter().sum::<f64>() / tracks[0].block_count() as f64;
     Noise {

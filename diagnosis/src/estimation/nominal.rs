@@ -1,7 +1,8 @@
-//! The nominal model in units of acceleration: its coefficients, their priors, and the sizes that it allows effects.
+//! The nominal model in units of acceleration: its coefficients, their priors, and the sizes that
+//! it allows effects.
 
-use crate::effects::EffectName;
 use crate::effects::definition::{Allowed, NominalTerm};
+use crate::effects::{EffectName, WholeMachine};
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::filter::Noise;
 use crate::estimation::skew_columns;
@@ -16,9 +17,11 @@ pub(crate) enum Key {
     Viscous,
     Coulomb,
     Offset,
-    /// Rows by which the command acts late, beyond those that were found before, times gain over inertia.
+    /// Rows by which the command acts late, beyond those that were found before, times gain over
+    /// inertia.
     Skew,
-    /// Part of the command that acts in the row before and as much in the row after, times gain over inertia.
+    /// Part of the command that acts in the row before and as much in the row after, times gain
+    /// over inertia.
     Spread,
     Weight,
     /// Gravity on an off-centre mass, of absolute counts.
@@ -38,40 +41,16 @@ pub(crate) struct Nominal {
     pub(crate) rig: Rig,
     /// Sign with which the measured load acts; zero where it was not seen to act.
     pub(crate) external: f64,
-    /// Gain over inertia found from force where the rig hardly knows it: (value, relative standard deviation).
+    /// Gain over inertia found from force where the rig hardly knows it: (value, relative standard
+    /// deviation).
     pub(crate) anchor: Option<(f64, f64)>,
     /// True if the refit explains most of the force.
     pub(crate) is_balanced: bool,
     /// Inertia added to rig and command alike, where the machine's own hardly matters, kg·m² or kg.
     pub(crate) virtual_inertia: f64,
-    /// Rows by which the commands were delayed because they act after their time stamps; none if the recordings show no skew.
+    /// Rows by which the commands were delayed because they act after their time stamps; none if
+    /// the recordings show no skew.
     pub(crate) skew_rows: Option<f64>,
-}
-
-/// Values of the whole machine that the law of a joint uses, all per inertia: per unit of command and of the measured load, by
-/// dry
-/// and viscous friction, and by the weight.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Machine {
-    pub(crate) per_command: f64,
-    pub(crate) dry: f64,
-    viscous: f64,
-    per_force: f64,
-    weight: f64,
-}
-
-impl Machine {
-    /// The values of a shape.
-    pub(crate) fn shape(&self) -> [(&'static str, f64); 5] {
-        let Self { per_command, dry, viscous, per_force, weight } = *self;
-        [
-            ("per_command", per_command),
-            ("dry", dry),
-            ("viscous", viscous),
-            ("per_force", per_force),
-            ("weight", weight),
-        ]
-    }
 }
 
 /// The number of standard deviations by which a nominal value may move in a refit.
@@ -86,14 +65,14 @@ fn least_of_truth(sd: f64) -> f64 {
     1.0 - (FARTHEST * sd).min(0.98)
 }
 
-/// Most that the truth may be over its nominal value: one that is off by its deviation may be small against the truth, so
-/// that this is farther than the way down.
+/// Most that the truth may be over its nominal value: one that is off by its deviation may be small
+/// against the truth, so that this is farther than the way down.
 fn most_over_nominal(sd: f64) -> f64 {
     (2.0 * (1.0 + REACH * sd)).max(1.0 / least_of_truth(sd))
 }
 
-/// Largest part of the command that may do nothing: where forces are in balance, where the inertia is hardly known, and
-/// where forces are not in balance.
+/// Largest part of the command that may do nothing: where forces are in balance, where the inertia
+/// is hardly known, and where forces are not in balance.
 const IGNORED: f64 = 0.9;
 const IGNORED_UNANCHORED: f64 = 0.35;
 const IGNORED_UNBALANCED: f64 = 0.2;
@@ -179,7 +158,8 @@ impl Nominal {
             Key::Weight => relative(rig.model.weight.unwrap_or(0.0), rig.weight_sd()),
             Key::Gravity => relative(rig.model.gravity.unwrap_or(0.0), rig.gravity_sd()),
             Key::Offset => {
-                // A rig without an offset still sees a bias that wanders by a fraction of the disturbance.
+                // A rig without an offset still sees a bias that wanders by a fraction of the
+                // disturbance.
                 let wander = 0.5 * noise.slow.sqrt();
                 let sd = if self.has_offset() {
                     let declared = rig.uncertainty.offset.unwrap_or(0.0) / j;
@@ -212,14 +192,16 @@ impl Nominal {
         name.definition().limits(term, &allowed)
     }
 
-    /// Most that a friction of the rig may be over the inertia: twice what the rig says, any where it says zero.
+    /// Most that a friction of the rig may be over the inertia: twice what the rig says, any where
+    /// it says zero.
     fn most_friction(&self, value: Option<f64>) -> f64 {
         let most = 2.0 * value.unwrap_or(0.0) / self.known_inertia();
         if most > 0.0 { most } else { f64::INFINITY }
     }
 
-    /// Largest part of the command that may do nothing. Where the inertia is hardly known or the forces are far from balance,
-    /// a drive that ignores its command explains anything, and so explains nothing.
+    /// Largest part of the command that may do nothing. Where the inertia is hardly known or the
+    /// forces are far from balance, a drive that ignores its command explains anything, and so
+    /// explains nothing.
     pub(crate) fn most_ignored(&self) -> f64 {
         match (self.anchor, self.is_balanced) {
             (Some(_), _) => IGNORED_UNANCHORED,
@@ -238,18 +220,20 @@ impl Nominal {
         taken > self.most_ignored() * whole
     }
 
-    /// Deceleration that dry friction makes, as far as the rig tells; otherwise what is ordinary for its drive.
+    /// Deceleration that dry friction makes, as far as the rig tells; otherwise what is ordinary
+    /// for its drive.
     pub(crate) fn dry_deceleration(&self) -> f64 {
         let dry = self.rig.model.coulomb.filter(|x| *x > 0.0).unwrap_or(self.force_scale());
         dry / self.known_inertia()
     }
 
-    /// Returns the values of the whole machine that the law of a joint uses: each as `fitted` has it, or as the rig has it.
-    pub(crate) fn machine(&self, fitted: &dyn Fn(Key) -> Option<f64>) -> Machine {
+    /// Returns the values of the whole machine that the law of a joint uses: each as `fitted` has
+    /// it, or as the rig has it.
+    pub(crate) fn machine(&self, fitted: &dyn Fn(Key) -> Option<f64>) -> WholeMachine {
         let model = &self.rig.model;
         let fitted = |key: Key, otherwise: f64| fitted(key).unwrap_or(otherwise);
         let per_inertia = |force: Option<f64>| force.unwrap_or(0.0) / self.known_inertia();
-        Machine {
+        WholeMachine {
             per_command: fitted(Key::Gain, self.known_gain()),
             dry: fitted(Key::Coulomb, self.dry_deceleration()),
             viscous: fitted(Key::Viscous, per_inertia(model.viscous)),
@@ -258,7 +242,8 @@ impl Nominal {
         }
     }
 
-    /// A force that is ordinary for this rig: its dry friction, or what its drive does at a tenth of its limit.
+    /// A force that is ordinary for this rig: its dry friction, or what its drive does at a tenth
+    /// of its limit.
     pub(crate) fn force_scale(&self) -> f64 {
         let limit = self.rig.actuator.limit.map_or(0.0, |limit| 0.1 * limit * self.rig.actuator.gain.abs());
         self.rig.model.coulomb.unwrap_or(0.0).max(limit)

@@ -1,25 +1,22 @@
-//! Mistakes that people make with units, signs and columns, seen in the recordings before anything is searched: each gets the
-//! sentence that helps, and none may end in a name.
+//! Mistakes that people make with units, signs and columns, seen in the recordings before anything
+//! is searched: each gets the sentence that helps, and none may end in a name.
 
 use crate::io::recording::Recording;
 use crate::io::rig::Rig;
 use crate::numerics::linear::{Factor, Square};
+use crate::numerics::spread::spread;
 use crate::simulation::Motion;
 
-/// Readings of an encoder are whole counts: where more than this part is not, and fewer counts than this are travelled, they are
-/// something else.
+/// Readings of an encoder are whole counts: where more than this part is not, and fewer counts than
+/// this are travelled, they are something else.
 const BROKEN: f64 = 0.5;
 const FEW_COUNTS: f64 = 2000.0;
 /// Part of the force's variance that motion has to explain before its scale or sign is judged.
 const EXPLAINED: f64 = 0.6;
-/// Ratio from which a scale error is taken for a wrong unit, and the largest that is still taken for a factor of a thousand.
+/// Ratio from which a scale error is taken for a wrong unit, and the largest that is still taken
+/// for a factor of a thousand.
 const OFF: f64 = 250.0;
 const FAR: f64 = 4000.0;
-
-fn spread(column: &[f64]) -> f64 {
-    let low = column.iter().copied().fold(f64::INFINITY, f64::min);
-    column.iter().copied().fold(f64::NEG_INFINITY, f64::max) - low
-}
 
 fn broken(column: &[f64]) -> f64 {
     column.iter().filter(|x| x.fract() != 0.0).count() as f64 / column.len().max(1) as f64
@@ -106,8 +103,9 @@ impl Smoothed {
         }
     }
 
-    /// The inertia for which the motion asks, with friction and a constant beside, and the part of the force's variance that they
-    /// explain; none where acceleration explains too little for its scale to say anything.
+    /// The inertia for which the motion asks, with friction and a constant beside, and the part of
+    /// the force's variance that they explain; none where acceleration explains too little for its
+    /// scale to say anything.
     fn inertia(&self) -> Option<(f64, f64)> {
         let force = &self.force;
         let constant = vec![1.0; force.len()];
@@ -121,7 +119,8 @@ impl Smoothed {
         (all > 0.0 && by_acceleration > 0.3 * all).then(|| (factors[0], 1.0 - left / all))
     }
 
-    /// True if the axis gives energy to its drive and would gain it by friction: a spring gives back what it stored.
+    /// True if the axis gives energy to its drive and would gain it by friction: a spring gives
+    /// back what it stored.
     fn gains_by_friction(&self) -> bool {
         let constant = vec![1.0; self.force.len()];
         let columns = [&self.acceleration, &self.velocity, &self.direction, &constant, &self.position];
@@ -180,14 +179,15 @@ fn scale_or_sign(recording: &Recording, rig: &Rig) -> Option<String> {
     None
 }
 
-/// Factor between the inertia for which one recording asks and that of the others from which they are of other units: no load that is
-/// changed between recordings makes as much.
+/// Factor between the inertia for which one recording asks and that of the others from which they
+/// are of other units: no load that is changed between recordings makes as much.
 const ANOTHER_UNIT: f64 = 5.0;
 
-/// The recording whose force and motion are of other units than those of the others, as a sentence with its place; of two, the one that
-/// is farther from the rig.
+/// The recording whose force and motion are of other units than those of the others, as a sentence
+/// with its place; of two, the one that is farther from the rig.
 pub(crate) fn odd_one(all: &[&Recording], rig: &Rig) -> Option<(usize, String)> {
-    // A force from outside, or an effect of the rig, may be most of the force in one recording and nothing in another.
+    // A force from outside, or an effect of the rig, may be most of the force in one recording and
+    // nothing in another.
     if !rig.effects.is_empty() || all.iter().any(|recording| recording.force.is_some()) {
         return None;
     }
@@ -225,7 +225,8 @@ mod tests {
     const RIG: &str = "format = 1\nkind = \"rotary\"\n[model]\ninertia = 2.0e-3\nviscous = 2.0e-3\n[actuator]\ngain = 1.0\n\
                        command_unit = \"N·m\"\n[encoder]\ncounts_per_unit = 1.0e5\n";
 
-    /// A swing from 2 rad that dies out, and the torque that it takes against a spring of `stiffness` N·m/rad.
+    /// A swing from 2 rad that dies out, and the torque that it takes against a spring of
+    /// `stiffness` N·m/rad.
     fn swing(stiffness: f64) -> Recording {
         let mut out = Recording { file: "fit.csv".into(), ..Recording::default() };
         for row in 0..8000 {

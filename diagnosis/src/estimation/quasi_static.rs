@@ -1,8 +1,10 @@
-//! Machines whose inertia hardly matters: slow motion in which the drive works against friction and load alone.
+//! Machines whose inertia hardly matters: slow motion in which the drive works against friction and
+//! load alone.
 //!
-//! With next to nothing on the left side of the equation of motion, setting every term to zero fits such a recording best. The
-//! same inertia added to rig and command alike, `(J + ΔJ)·q̈ = (u + ΔJ·q̈/gain)·gain − …`, changes no force and gives the left side
-//! a size that no refit can take away. The acceleration is that of the recording, smoothed; nothing here fits.
+//! With next to nothing on the left side of the equation of motion, setting every term to zero fits
+//! such a recording best. The same inertia added to rig and command alike, `(J + ΔJ)·q̈ = (u +
+//! ΔJ·q̈/gain)·gain − …`, changes no force and gives the left side a size that no refit can take
+//! away. The acceleration is that of the recording, smoothed; nothing here fits.
 
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::force_residual::Estimator;
@@ -18,7 +20,8 @@ const ADDED: f64 = 0.012;
 /// Relative uncertainty of an inertia that was added.
 const KNOWN: f64 = 0.02;
 
-/// Adds inertia to rig and commands where the machine's own hardly matters; says nothing where it does.
+/// Adds inertia to rig and commands where the machine's own hardly matters; says nothing where it
+/// does.
 pub(crate) fn add_inertia(
     nominal: &mut Nominal,
     fit: &mut [BlockedRecording],

@@ -1,17 +1,21 @@
-//! A first-order filter in the reading that the rig declares: how far the reading lags behind the axis.
+//! A first-order filter in the reading that the rig declares: how far the reading lags behind the
+//! axis.
 //!
-//! With ℓ the position less its filtered reading, ℓ′ = v − ℓ/τ. It is a state of its own beside position and speed, so
-//! every force, linear or not, acts on the axis and only the reading is filtered.
+//! With ℓ the position less its filtered reading, ℓ′ = v − ℓ/τ. It is a state of its own beside
+//! position and speed, so every force, linear or not, acts on the axis and only the reading is
+//! filtered.
 
 /// The terms of the lag at some time in a block, per unit.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct LagTerms {
     /// The effect of the lag at the block's start.
     pub(crate) lag: f64,
-    /// The effect of the speed at the block's start, s, and of an acceleration held over the block, s².
+    /// The effect of the speed at the block's start, s, and of an acceleration held over the block,
+    /// s².
     pub(crate) speed: f64,
     pub(crate) acceleration: f64,
-    /// The effect of the change of position and of speed that an input makes over the block (no unit and s).
+    /// The effect of the change of position and of speed that an input makes over the block (no
+    /// unit and s).
     pub(crate) dq: f64,
     pub(crate) dv: f64,
 }
@@ -22,12 +26,14 @@ pub(crate) struct LagStep {
     /// At the block's end, and the mean over its rows.
     pub(crate) end: LagTerms,
     pub(crate) seen: LagTerms,
-    /// Covariance of the lag at the end with position, speed and itself by a white acceleration of unit strength.
+    /// Covariance of the lag at the end with position, speed and itself by a white acceleration of
+    /// unit strength.
     pub(crate) white: [f64; 3],
 }
 
 impl LagStep {
-    /// Over a block of `span` s whose rows lie at `rows` s since its start, behind a filter of `time_constant` s.
+    /// Over a block of `span` s whose rows lie at `rows` s since its start, behind a filter of
+    /// `time_constant` s.
     pub(crate) fn new(time_constant: f64, span: f64, rows: impl Iterator<Item = f64>) -> Self {
         let tau = time_constant;
         let end = LagTerms::at(tau, span, span);
@@ -38,7 +44,8 @@ impl LagStep {
             count += 1.0;
         }
         let seen = LagTerms::default().plus(&seen, 1.0 / count.max(1.0));
-        // An impulse u s before the end moves position by u, speed by one and the lag by τ(1 − e^(−u/τ)).
+        // An impulse u s before the end moves position by u, speed by one and the lag by τ(1 −
+        // e^(−u/τ)).
         let (h, e) = (span, end.lag);
         let with_position = 0.5 * tau * h * h - tau * tau * (end.speed - h * e);
         let with_itself = tau * tau * (h - 2.0 * end.speed + 0.5 * end.speed * (1.0 + e));
@@ -47,7 +54,8 @@ impl LagStep {
 }
 
 impl LagTerms {
-    /// At `time` s since the start of a block of `span` s. An input's speed is taken as 2αt + 3βt² with the changes that it makes.
+    /// At `time` s since the start of a block of `span` s. An input's speed is taken as 2αt + 3βt²
+    /// with the changes that it makes.
     fn at(tau: f64, span: f64, time: f64) -> Self {
         let speed = -tau * (-time / tau).exp_m1();
         let acceleration = tau * (time - speed);

@@ -1,4 +1,5 @@
-//! The null: the nominal structure refitted within its uncertainty, with the noise and the smoothed motion that go with it.
+//! The null: the nominal structure refitted within its uncertainty, with the noise and the smoothed
+//! motion that go with it.
 
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::filter::{Noise, Observed};
@@ -13,14 +14,16 @@ use crate::numerics::linear::{Prior, Square, bounded};
 /// Rests are dilated by this many blocks: the sign is uncertain next to a reversal.
 const MARGIN: usize = 1;
 
-/// No count for this long is rest, s: the slowest motion that is distinguished from it makes fifty counts a second.
+/// No count for this long is rest, s: the slowest motion that is distinguished from it makes fifty
+/// counts a second.
 const STILL_S: f64 = 0.02;
 
-/// Counts that a smoothed motion passes and the encoder does not before they contradict each other: the motion rests there.
+/// Counts that a smoothed motion passes and the encoder does not before they contradict each other:
+/// the motion rests there.
 const CONTRADICTED: f64 = 2.0;
 
-/// Blocks at rest whatever a filter makes of the speed `v`: the encoder gives no count for a while, or for less where by
-/// that speed it should have given some.
+/// Blocks at rest whatever a filter makes of the speed `v`: the encoder gives no count for a while,
+/// or for less where by that speed it should have given some.
 fn still(track: &BlockedRecording, v: &[f64], count: f64) -> Vec<bool> {
     let n = track.block_count();
     let reach = ((STILL_S * track.block_rate()).ceil() as usize).max(2);
@@ -42,11 +45,12 @@ fn still(track: &BlockedRecording, v: &[f64], count: f64) -> Vec<bool> {
 /// Time over which the reading of a held axis is looked at, s.
 const HELD_S: f64 = 0.05;
 
-/// Part of the fast speed below which a reading that goes no further in that time is jitter about a place, not motion.
+/// Part of the fast speed below which a reading that goes no further in that time is jitter about a
+/// place, not motion.
 const JITTER: f64 = 0.004;
 
-/// Blocks at which a drive holds the axis: a fine encoder counts the jitter of a loop or a frame there, and the friction is a reaction.
-/// `fast` is the fast speed of the recording, rad/s or m/s.
+/// Blocks at which a drive holds the axis: a fine encoder counts the jitter of a loop or a frame
+/// there, and the friction is a reaction. `fast` is the fast speed of the recording, rad/s or m/s.
 fn held(track: &BlockedRecording, fast: f64) -> Vec<bool> {
     let (n, rate) = (track.block_count(), track.block_rate());
     let half = ((0.5 * HELD_S * rate).round() as usize).max(1);
@@ -59,31 +63,36 @@ fn held(track: &BlockedRecording, fast: f64) -> Vec<bool> {
     (0..n).map(is_held).collect()
 }
 
-/// Multiple of the slowest speed that noise lets be seen which an axis has a block before and a block after a reversal that it sweeps
-/// through.
+/// Multiple of the slowest speed that noise lets be seen which an axis has a block before and a
+/// block after a reversal that it sweeps through.
 const SWEPT: f64 = 3.0;
 
-/// Blocks before and after such a reversal in which the axis runs one way: shorter swings turn back within a block.
+/// Blocks before and after such a reversal in which the axis runs one way: shorter swings turn back
+/// within a block.
 const ONE_WAY: usize = 4;
 
-/// Multiple of the change of speed that the rig's dry friction makes over the same time which the drive makes there: when exactly the
-/// friction changes its sign then hardly matters.
+/// Multiple of the change of speed that the rig's dry friction makes over the same time which the
+/// drive makes there: when exactly the friction changes its sign then hardly matters.
 const DRIVEN: f64 = 10.0;
 
-/// Part of the dry friction that is not known in the block of a reversal, because the speeds of two blocks tell only roughly when the
-/// axis turns back. Set by hand: a tenth of a block too early or too late changes the mean friction by twice that part.
+/// Part of the dry friction that is not known in the block of a reversal, because the speeds of two
+/// blocks tell only roughly when the axis turns back. Set by hand: a tenth of a block too early or
+/// too late changes the mean friction by twice that part.
 const UNSURE: f64 = 0.2;
 
-/// True if the disturbance is larger than what is not known of the friction at a reversal, so that such blocks may judge a model.
+/// True if the disturbance is larger than what is not known of the friction at a reversal, so that
+/// such blocks may judge a model.
 fn outweighs_reversals(track: &BlockedRecording, noise: &Noise) -> bool {
     // Friction takes off twice as much in a block as it stops within half of one.
     let friction = 2.0 * track.blocks.stops_from * track.block_rate();
     noise.slow.sqrt() >= UNSURE * friction
 }
 
-/// Blocks on both sides of a reversal through which the axis is driven without a stop, so that the direction is known: its speed `v` is
-/// large before and after, and it is not held in between. `floor` is the slowest speed that is seen, `by_friction` the change of speed
-/// over a block that dry friction makes: where that is zero, the rig does not know the friction, and every reversal may be a stop.
+/// Blocks on both sides of a reversal through which the axis is driven without a stop, so that the
+/// direction is known: its speed `v` is large before and after, and it is not held in between.
+/// `floor` is the slowest speed that is seen, `by_friction` the change of speed over a block that
+/// dry friction makes: where that is zero, the rig does not know the friction, and every reversal
+/// may be a stop.
 fn swept(v: &[f64], holds: &[bool], floor: f64, by_friction: f64) -> Vec<bool> {
     let mut out = vec![false; v.len()];
     for k in ONE_WAY - 1..v.len().saturating_sub(ONE_WAY) {
@@ -99,7 +108,8 @@ fn swept(v: &[f64], holds: &[bool], floor: f64, by_friction: f64) -> Vec<bool> {
     out
 }
 
-/// Blocks beside one that is `slow` or beside a change of the sign of the speed `v`, but for what is `swept`.
+/// Blocks beside one that is `slow` or beside a change of the sign of the speed `v`, but for what
+/// is `swept`.
 fn near_rest(v: &[f64], slow: &[bool], swept: &[bool]) -> Vec<bool> {
     let n = v.len();
     let is_beside = |j: usize| {
@@ -111,8 +121,8 @@ fn near_rest(v: &[f64], slow: &[bool], swept: &[bool]) -> Vec<bool> {
     (0..n).map(is_beside).collect()
 }
 
-/// Estimates the motion of every recording under a model's input and marks where the axis rests; `count` is one of the
-/// encoder's.
+/// Estimates the motion of every recording under a model's input and marks where the axis rests;
+/// `count` is one of the encoder's.
 pub(crate) fn estimate_motion(
     tracks: &mut [BlockedRecording],
     totals: &[Total],
@@ -121,7 +131,8 @@ pub(crate) fn estimate_motion(
     knows: Knows,
 ) {
     for (track, total) in tracks.iter_mut().zip(totals) {
-        // The fit allows any force at a reversal, the motion does not: where the axis is driven through, its speed is known there.
+        // The fit allows any force at a reversal, the motion does not: where the axis is driven
+        // through, its speed is known there.
         let observed = Observed { any_force: &track.motion.rest, ..track.observed() };
         let state = motion(&observed, noise, total, knows);
         let mut sd: Vec<f64> = state
@@ -162,10 +173,11 @@ pub(crate) fn estimate_motion(
 /// Relative standard deviation of gain over inertia above which the rig hardly knows it.
 const LOOSE: f64 = 0.5;
 
-/// Anchors the inertia if the rig hardly knows it: slow motion under a speed loop is explained as well by an axis too heavy to
-/// be moved as by forces in balance. Regressing the command on the motion, rather than the motion on the command, has
-/// no such way out; what it finds anchors the fits that follow. A result out of reach is ignored: if the largest forces are missing
-/// from the model, the motion says nothing about the inertia.
+/// Anchors the inertia if the rig hardly knows it: slow motion under a speed loop is explained as
+/// well by an axis too heavy to be moved as by forces in balance. Regressing the command on the
+/// motion, rather than the motion on the command, has no such way out; what it finds anchors the
+/// fits that follow. A result out of reach is ignored: if the largest forces are missing from the
+/// model, the motion says nothing about the inertia.
 fn anchor(nominal: &mut Nominal, fit: &Fit) {
     let size = fit.keys.len();
     // Unknowns: the data's own column takes the place of the gain's.
@@ -173,7 +185,7 @@ fn anchor(nominal: &mut Nominal, fit: &Fit) {
     let mut b = vec![0.0; size];
     for (one, places) in fit.prepared.iter().zip(&fit.places) {
         let p = places.len();
-        // Undo the reference: the data as it stands is the residual plus the reference's columns.
+        // Undo the reference: the data itself is the residual plus the reference's columns.
         let mut raw: Vec<f64> = one.reference.clone();
         raw.push(1.0);
         for segment in &one.segments {
@@ -203,7 +215,8 @@ fn anchor(nominal: &mut Nominal, fit: &Fit) {
 /// Factor by which a gain over inertia that is hardly known may differ from the rig's.
 const ANCHOR_REACH: f64 = 40.0;
 
-/// Returns the gain over inertia that was found, if it has the sign of the rig's and is within reach of it.
+/// Returns the gain over inertia that was found, if it has the sign of the rig's and is within
+/// reach of it.
 fn anchored(found: f64, nominal: f64) -> Option<f64> {
     let reach = ANCHOR_REACH.recip()..ANCHOR_REACH;
     reach.contains(&(found / nominal)).then_some(found)
@@ -215,7 +228,8 @@ fn load_sign(nominal: &Nominal, fit: &Fit) -> Option<f64> {
     (seen.abs() > 0.5 && seen.abs() < 2.0).then(|| seen.signum())
 }
 
-/// Scale of acceleration of the recordings: what the command makes or, where something else drives the motion, what is seen.
+/// Scale of acceleration of the recordings: what the command makes or, where something else drives
+/// the motion, what is seen.
 pub(crate) fn acceleration_scale(nominal: &Nominal, tracks: &[BlockedRecording]) -> f64 {
     let (mut square, mut rows) = (0.0, 0.0);
     for track in tracks {
@@ -265,7 +279,8 @@ pub(crate) fn seen_acceleration(track: &BlockedRecording) -> f64 {
     0.0
 }
 
-/// Finds noise, motion and refitted values together, a few times round, from a first look without friction.
+/// Finds noise, motion and refitted values together, a few times round, from a first look without
+/// friction.
 pub(crate) fn settle(nominal: &mut Nominal, tracks: &mut [BlockedRecording]) -> (Noise, Fit) {
     let mut scale = acceleration_scale(nominal, tracks);
     let mut noise = noise::guess(tracks, scale);
@@ -301,7 +316,8 @@ mod tests {
     use crate::io::rig::Rig;
     use std::sync::Arc;
 
-    /// Blocks of 2.5 ms on which an axis passes one count each and from 40 on, for five blocks, none.
+    /// Blocks of 2.5 ms on which an axis passes one count each and from 40 on, for five blocks,
+    /// none.
     fn stopped_for_a_moment() -> BlockedRecording {
         let count = |row: i32| f64::from(if row <= 40 { row } else { (row - 5).max(40) });
         let recording = Recording {
@@ -337,7 +353,8 @@ mod tests {
 
     #[test]
     fn a_reversal_that_is_driven_through_allows_any_force() {
-        // Half a radian at 8 rad/s by the command that this takes, against a friction of a thirtieth of it, and shaken by a force as large.
+        // Half a radian at 8 rad/s by the command that this takes, against a friction of a
+        // thirtieth of it, and shaken by a force as large.
         let position = |row: f64| 500.0 * (row * 0.02).cos() + 3.0 * (row * 0.05).cos();
         let recording = Recording {
             time_s: (0..800).map(|row| f64::from(row) * 2.5e-3).collect(),

@@ -6,7 +6,8 @@ use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::input::Input;
 use crate::estimation::kept::Side;
 
-/// The same inputs, kept from one model to the next where they are costly and rest on the command as recorded.
+/// The same inputs, kept from one model to the next where they are costly and rest on the command
+/// as recorded.
 pub(crate) fn kept_inputs(
     track: &BlockedRecording,
     effect: &Effect,
@@ -24,8 +25,9 @@ pub(crate) fn kept_inputs(
     track.kept.inputs((&track.motion, &track.rows), (effect, bias), new)
 }
 
-/// The inputs of one effect on force or sensor over a recording; `bias` is the acceleration by the force that is there all the
-/// time, which a second mass takes up, `drive` is the command's input, asked for only where the effect scales it.
+/// The inputs of one effect on force or sensor over a recording; `bias` is the acceleration by the
+/// force that is there all the time, which a second mass takes up, `drive` is the command's input,
+/// asked for only where the effect scales it.
 pub(crate) fn effect_inputs(
     track: &BlockedRecording,
     effect: &Effect,
@@ -92,7 +94,7 @@ fn columns_of(track: &BlockedRecording, effect: &Effect, law: &mut Law, command:
 fn uses_command(effect: &Effect) -> bool {
     let over_command = effect.table.as_ref().is_some_and(|table| table.over.contains(&Variable::Command))
         || effect.name.formula().is_some_and(|formula| formula.uses("u"));
-    over_command || effect.shape.contains_key("of_drive") || effect.shape.contains_key("mean_square")
+    over_command || effect.name.definition().reads_command(effect)
 }
 
 /// The state of the axis in block `j`, without its command.

@@ -1,9 +1,10 @@
-//! The skew between command and reading: a log may store a command up to a row before or after the time at which it acts, and a
-//! simulation that integrates by Euler's method is half a row early or late. If that explains most of the residual of the nominal model,
-//! every model allows for it, so that no effect has to explain it.
+//! The skew between command and reading: a log may store a command up to a row before or after the
+//! time at which it acts, and a simulation that integrates by Euler's method is half a row early or
+//! late. If that explains most of the residual of the nominal model, every model allows for it, so
+//! that no effect has to explain it.
 //!
-//! Large skews shift the commands themselves; what is left is a column of the linear fit, and so is what happens within a row: a
-//! command may change there, or act all at once.
+//! Large skews shift the commands themselves; the rest is a column of the linear fit, and so is
+//! what happens within a row: a command may change there, or act all at once.
 
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::effective_command::delayed;
@@ -18,10 +19,10 @@ use crate::estimation::skew_columns::MOST_ROWS;
 const SEEN: f64 = 6.0;
 /// Part of the largest skew from which it is at its limit.
 const AT_LIMIT: f64 = 0.98;
-/// Part of the mean square above the noise of the sensor that a skew may leave. Other physics, and commands that a loop makes of noise,
-/// show false skews, which leave most of it.
+/// Part of the mean square above the noise of the sensor that a skew may leave. Other physics, and
+/// commands that a loop makes of noise, show false skews, which leave most of it.
 const MOST_LEFT: f64 = 0.5;
-/// Rounds of shifting the commands and fitting what is left.
+/// Rounds of shifting the commands and fitting the rest.
 const ROUNDS: usize = 3;
 /// A skew that changes by less is found, rows.
 const FOUND: f64 = 0.01;
@@ -46,8 +47,9 @@ pub(crate) fn row_s(track: &BlockedRecording) -> f64 {
     hold.iter().sum::<f64>() / hold.len().max(1) as f64
 }
 
-/// Finds the skew of recordings under the nominal model and delays their commands by it. Nothing changes if the recordings show no
-/// skew or more than a row of it, or if it does not explain most of the residual of the nominal model.
+/// Finds the skew of recordings under the nominal model and delays their commands by it. Nothing
+/// changes if the recordings show no skew or more than a row of it, or if it does not explain most
+/// of the residual of the nominal model.
 pub(crate) fn settle(nominal: &mut Nominal, tracks: &mut [BlockedRecording], noise: &Noise, scale: f64) {
     let without = Fit::new(&Model::default(), nominal, tracks, noise);
     let mut trial = Nominal { skew_rows: Some(0.0), ..nominal.clone() };

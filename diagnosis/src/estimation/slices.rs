@@ -1,5 +1,5 @@
-//! Rows of a block taken together, for laws that are faster than a block and slower than a row. They hold time stamps as
-//! they stand and nothing of what a law makes of them.
+//! Rows of a block taken together, for laws that are faster than a block and slower than a row.
+//! They hold time stamps as they stand and nothing of what a law makes of them.
 
 use crate::estimation::input::Input;
 use std::ops::Range;
@@ -14,7 +14,8 @@ pub(crate) struct Slice {
     /// Sums over the rows of the time since the slice's start, s, and of half its square, s².
     tau1: f64,
     tau2: f64,
-    /// Part of the way from the middle of its block to that of the one before or after at which its own middle is.
+    /// Part of the way from the middle of its block to that of the one before or after at which its
+    /// own middle is.
     pub(crate) aside: f64,
     pub(crate) is_late: bool,
 }
@@ -49,7 +50,8 @@ impl Slices {
         Self { per_block: rows_per_block.div_ceil(rows), rows_per_block, slices }
     }
 
-    /// Says of each slice where in its block its middle is; `spans` are the lengths of the blocks, s.
+    /// Says of each slice where in its block its middle is; `spans` are the lengths of the blocks,
+    /// s.
     pub(crate) fn place_in(&mut self, spans: &[f64]) {
         for (slices, block) in self.slices.chunks_exact_mut(self.per_block).zip(spans) {
             for slice in slices {

@@ -1,4 +1,5 @@
-//! The motion of a recording under a model's input, by the filter alone or by a fixed-interval smoother.
+//! The motion of a recording under a model's input, by the filter alone or by a fixed-interval
+//! smoother.
 
 use crate::estimation::covariance::{
     Covariance, Noise, Observed, Step, initial, predict, product, times, update,
@@ -39,8 +40,8 @@ impl Motion {
 pub(crate) enum Knows {
     /// Every row of the recording: the fixed-interval smoother, for recordings that are fitted.
     All,
-    /// The rows up to the block's own: the filter, for recordings that judge. What knows the rows to come knows the disturbance
-    /// that a force is to be told from.
+    /// The rows up to the block's own: the filter, for recordings that judge. What knows the rows
+    /// to come knows the disturbance from which a force is to be found.
     Past,
 }
 
@@ -104,8 +105,8 @@ fn filter<const N: usize>(track: &Observed, noise: &Noise, total: &Total) -> Vec
     filtered
 }
 
-/// Modified Bryson–Frazier form: later readings come back as an adjoint, and no covariance is inverted (Bierman,
-/// Factorization Methods for Discrete Sequential Estimation, 1977, chapter X).
+/// Modified Bryson–Frazier form: later readings come back as an adjoint, and no covariance is
+/// inverted (Bierman, Factorization Methods for Discrete Sequential Estimation, 1977, chapter X).
 fn smooth<const N: usize>(
     track: &Observed,
     noise: &Noise,

@@ -80,7 +80,8 @@ mod tests {
     use crate::io::recording::Recording;
     use crate::io::rig::Rig;
 
-    /// Four seconds in which an axis is driven to and fro; speeds are those of the sine times `speed`.
+    /// Four seconds in which an axis is driven to and fro; speeds are those of the sine times
+    /// `speed`.
     fn track(speed: f64) -> BlockedRecording {
         let time_s: Vec<f64> = (0..4001).map(|row| f64::from(row) * 1e-3).collect();
         let recording = Recording {

@@ -1,4 +1,5 @@
-//! Files in and the shape of the report: rigs, recordings, their checks and `diagnosis.json`. Nothing here fits anything.
+//! Files in and the shape of the report: rigs, recordings, their checks and `diagnosis.json`.
+//! Nothing here fits anything.
 
 pub(crate) mod error;
 mod known_keys;

@@ -181,7 +181,8 @@ impl Recording {
         })
     }
 
-    /// The recording without long rests at its ends, in which nothing can be told, and how much was taken from its start, s.
+    /// The recording without long rests at its ends, in which nothing can be told, and how much was
+    /// taken from its start, s.
     pub(crate) fn without_idle_ends(&self) -> (Cow<'_, Self>, f64) {
         let n = self.len();
         let counts = &self.position_counts;
@@ -238,7 +239,8 @@ impl Recording {
     }
 }
 
-/// Says what rows at a rate, Hz, can show: a swing takes some five rows, and the command is held from row to row.
+/// Says what rows at a rate, Hz, can show: a swing takes some five rows, and the command is held
+/// from row to row.
 pub fn shown_at(rate_hz: f64) -> String {
     format!(
         "{rate_hz:.0} rows a second: shows what happens below about {:.0} Hz; delays and lags much shorter than {:.2} ms do not show",

@@ -158,7 +158,8 @@ pub struct Rig {
     pub searched: Vec<EffectName>,
 }
 
-/// Uncertainty assumed where the rig declares none: a data-sheet value for what is easily measured, a guess for friction.
+/// Uncertainty assumed where the rig declares none: a data-sheet value for what is easily measured,
+/// a guess for friction.
 const UNDECLARED_EASY: f64 = 0.1;
 const UNDECLARED_FRICTION: f64 = 0.5;
 

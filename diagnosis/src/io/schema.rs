@@ -89,7 +89,8 @@ pub struct Named {
     pub separating_experiment: Option<String>,
 }
 
-/// A number on both kinds of recordings; not a number, `null` in the file, where nothing was fitted.
+/// A number on both kinds of recordings; not a number, `null` in the file, where nothing was
+/// fitted.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Both {
     /// On the recordings that were fitted.
@@ -109,10 +110,11 @@ fn null_is_nan<'de, D: serde::Deserializer<'de>>(from: D) -> Result<f64, D::Erro
     Ok(Option::<f64>::deserialize(from)?.unwrap_or(f64::NAN))
 }
 
-/// A length under the three models, root mean square; none where there is no such model or simulation.
+/// A length under the three models, root mean square; none where there is no such model or
+/// simulation.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct ByModel {
-    /// The rig as it stands.
+    /// The rig as it is.
     pub nominal: Option<f64>,
     /// With its values refitted.
     pub refit: Option<f64>,
@@ -151,7 +153,7 @@ pub struct FitTable {
     pub metric: String,
     /// N·m or N.
     pub unit: String,
-    /// The rig as it stands.
+    /// The rig as it is.
     pub nominal: Both,
     /// With its values refitted.
     pub refit: Both,
@@ -168,12 +170,15 @@ pub struct FitTable {
 pub struct Hypothesis {
     /// The effect.
     pub name: EffectName,
-    /// Log-likelihood of the held-out recordings that it brings over the model without it; none where it was not judged there.
+    /// Log-likelihood of the held-out recordings that it brings over the model without it; none
+    /// where it was not judged there.
     pub holdout_gain: Option<f64>,
-    /// The evidence for and against it, as its confidence weighs it; only where it came through the search.
+    /// The evidence for and against it, as its confidence weighs it; only where it came through the
+    /// search.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub evidence: Option<BTreeMap<String, f64>>,
-    /// Every effect that the data cannot tell from it, itself included; only where it came through the search.
+    /// Every effect that the data cannot tell from it, itself included; only where it came through
+    /// the search.
     #[serde(skip_serializing_if = "Vec::is_empty", default)]
     pub class: Vec<EffectName>,
     /// The reason why it was rejected; absent if it was named.
@@ -209,13 +214,15 @@ pub struct FreeForm {
     /// Its form in words.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub in_words: Option<String>,
-    /// Gain of log-likelihood on the held-out recordings over the model without it; none where it was not fitted for them.
+    /// Gain of log-likelihood on the held-out recordings over the model without it; none where it
+    /// was not fitted for them.
     pub holdout_gain: Option<f64>,
     /// The same on blocks of the fitted recordings that were left out, and its standard error.
     pub left_out_gain: f64,
     /// Its standard error.
     pub left_out_error: f64,
-    /// Part of what the named effects and this force together take of left-out blocks that the named effects take, 0 to 1.
+    /// Part of what the named effects and this force together take of left-out blocks that the
+    /// named effects take, 0 to 1.
     pub share_of_ceiling: f64,
 }
 
@@ -240,7 +247,8 @@ pub struct Report {
     pub fit: FitTable,
     /// Refitted nominal values that moved, by key.
     pub refitted: BTreeMap<String, f64>,
-    /// Rows by which commands act after their time stamps, -1 to 1; none where the recordings show no skew.
+    /// Rows by which commands act after their time stamps, -1 to 1; none where the recordings show
+    /// no skew.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub command_late_rows: Option<f64>,
     /// Clauses that say what the refit did that a reader has to know.
@@ -257,7 +265,8 @@ pub struct Report {
     /// Effects that these recordings could not show.
     #[serde(skip_serializing_if = "Vec::is_empty", default)]
     pub untested: Vec<Untested>,
-    /// The models that contend for the least decided name, the most probable first; empty where every name is single.
+    /// The models that contend for the least decided name, the most probable first; empty where
+    /// every name is single.
     #[serde(skip_serializing_if = "Vec::is_empty", default)]
     pub contenders: Vec<Contending>,
     /// The gain of a force of any form in addition to the named effects.

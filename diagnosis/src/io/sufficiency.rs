@@ -2,6 +2,7 @@
 
 use crate::io::recording::Recording;
 use crate::io::rig::Rig;
+use crate::numerics::spread::spread;
 
 /// Least of all recordings of a kind together, s and rows: short ones are pooled.
 const SHORTEST_S: f64 = 1.9;
@@ -18,7 +19,8 @@ const NOBODYS_HZ: f64 = 2.0;
 /// Fewest counts of travel.
 const FEWEST_COUNTS: f64 = 100.0;
 
-/// The reason why recordings cannot tell, if there is one; short ones tell together what none tells alone.
+/// The reason why recordings cannot tell, if there is one; short ones tell together what none tells
+/// alone.
 pub(crate) fn too_little(fit: &[Recording], holdout: &[Recording]) -> Option<String> {
     if let Some(reason) = fit.iter().chain(holdout).find_map(alone) {
         let enough = fit.iter().chain(holdout).filter(|recording| alone(recording).is_none());
@@ -66,7 +68,7 @@ fn alone(recording: &Recording) -> Option<String> {
         ));
     }
     let largest = recording.command.iter().fold(0.0_f64, |m, u| m.max(u.abs()));
-    // None at all is a free motion; one that never changes is told from no offset.
+    // None at all is a free motion; one that never changes is distinguished from no offset.
     if largest > 0.0 && spread(&recording.command) <= 1e-6 * largest {
         return Some(format!("the command of {file} is constant"));
     }
@@ -85,11 +87,6 @@ fn rate_is_off(recording: &Recording) -> Option<String> {
             recording.file
         )
     })
-}
-
-fn spread(column: &[f64]) -> f64 {
-    let low = column.iter().copied().fold(f64::INFINITY, f64::min);
-    column.iter().copied().fold(f64::NEG_INFINITY, f64::max) - low
 }
 
 /// The reason why a recording cannot be used at all: at rest, or of another unit than the rig.
@@ -118,8 +115,9 @@ pub(crate) fn unusable(recording: &Recording, rig: &Rig) -> Option<String> {
     let seconds = recording.duration_s();
     let travel = counts / rig.encoder.counts_per_unit;
     let asked = rig.actuator.gain.abs() * largest / rig.model.inertia;
-    // Constant acceleration over the whole recording bounds how far the command can bring the axis. One that is zero, or is
-    // weak and lets something else drive the motion, is another matter: there the motion itself must be possible.
+    // Constant acceleration over the whole recording bounds how far the command can bring the axis.
+    // One that is zero, or is weak and lets something else drive the motion, is another matter:
+    // there the motion itself must be possible.
     (largest > 0.0 && travel > IMPOSSIBLE * asked * seconds * seconds).then(|| {
         format!(
             "{file} travels {travel:.3} {}, which its command cannot cause with the rig's inertia and gain: a unit is wrong",

@@ -1,4 +1,5 @@
-//! Block bootstrap of a sum of gains, with pseudo-random numbers that are the same on every machine.
+//! Block bootstrap of a sum of gains, with pseudo-random numbers that are the same on every
+//! machine.
 
 /// Deterministic pseudo-random numbers (xorshift64*), seeded by a constant.
 pub(crate) struct Random(u64);
@@ -21,7 +22,8 @@ pub(crate) struct Gain {
     pub(crate) sum: f64,
     pub(crate) low: f64,
     pub(crate) high: f64,
-    /// Mean over standard error; neighbours are taken together so that what lasts longer than a segment counts once.
+    /// Mean over standard error; neighbours are taken together so that what lasts longer than a
+    /// segment counts once.
     pub(crate) z: f64,
     /// The same with the gain of each block limited.
     pub(crate) clipped_z: f64,

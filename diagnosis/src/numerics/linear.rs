@@ -19,7 +19,8 @@ impl Square {
     }
 }
 
-/// Cholesky factor of a symmetric matrix scaled to a unit diagonal; directions without information are left out.
+/// Cholesky factor of a symmetric matrix scaled to a unit diagonal; directions without information
+/// are left out.
 #[derive(Debug, Clone)]
 pub(crate) struct Factor {
     n: usize,
@@ -157,7 +158,7 @@ impl Prior {
 #[derive(Debug, Clone)]
 pub(crate) struct Solution {
     pub(crate) x: Vec<f64>,
-    /// True if a coefficient stands at a bound.
+    /// True if a coefficient is at a bound.
     pub(crate) bound: Vec<bool>,
     /// Covariance with the prior, for unit residual variance; zero at bounds.
     pub(crate) covariance: Square,
@@ -165,7 +166,8 @@ pub(crate) struct Solution {
     pub(crate) prior_cost: f64,
 }
 
-/// Solves for the coefficients that are not fixed; gives their places, the factor of their matrix and the solution.
+/// Solves for the coefficients that are not fixed; gives their places, the factor of their matrix
+/// and the solution.
 fn solve_free(full: &Square, right: &[f64], fixed: &[Option<f64>]) -> (Vec<usize>, Factor, Vec<f64>) {
     let free: Vec<usize> = (0..fixed.len()).filter(|i| fixed[*i].is_none()).collect();
     let mut part = Square::zero(free.len());

@@ -5,3 +5,4 @@ pub(crate) mod digits;
 pub(crate) mod golden_section;
 pub(crate) mod linear;
 pub(crate) mod parallel;
+pub(crate) mod spread;

@@ -1,5 +1,5 @@
-//! Work that several cores share, in the order of its items. The pool's own code is compiled here once: an iterator of it for each use
-//! took a sixth of the time that this crate takes to build.
+//! Work that several cores share, in the order of its items. The pool's own code is compiled here
+//! once: an iterator of it for each use took a sixth of the time that this crate takes to build.
 
 use rayon::prelude::*;
 use std::sync::Mutex;

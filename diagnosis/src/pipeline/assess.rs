@@ -1,4 +1,5 @@
-//! The fourth stage: how sure each effect is, and whether something without a name explains the recordings instead.
+//! The fourth stage: how sure each effect is, and whether something without a name explains the
+//! recordings instead.
 
 use super::diagnosis::Reason;
 use super::prepare::Prepared;
@@ -33,14 +34,16 @@ pub(crate) struct Assessment {
     pub(crate) named_alone: Option<Shown>,
     /// The gain of a force of any form in addition to the named effects.
     pub(crate) beside: Option<FreeFormShare>,
-    /// The force of any form that explains most, where nothing is named, and the refit with it beside.
+    /// The force of any form that explains most, where nothing is named, and the refit with it
+    /// beside.
     pub(crate) unnamed: Option<Unnamed>,
     pub(crate) with_unnamed: Option<Shown>,
     /// Physics without a name that explains most, where nothing is named.
     pub(crate) foreign: Option<Foreign>,
 }
 
-/// Weighs the effects that were found; the reason where the rig's model does not describe the recordings at all.
+/// Weighs the effects that were found; the reason where the rig's model does not describe the
+/// recordings at all.
 pub(crate) fn assess(prepared: &Prepared, found: Found) -> Result<Assessment, Reason> {
     let Prepared { nominal, .. } = prepared;
     let Found { fit, holdout, null, standing } = found;
@@ -87,9 +90,9 @@ pub(super) fn is_material(table: &FitTable) -> bool {
     table.patched.holdout <= (1.0 - MATERIAL) * table.refit.holdout
 }
 
-/// The model with the named effects and no other, where that is another one: what is not named was not found, and may be in no
-/// patched rig. An effect that has no size without the others is not named either, nor are effects that together take no material part
-/// off the held-out force error.
+/// The model with the named effects and no other, where that is another one: what is not named was
+/// not found, and may be in no patched rig. An effect that has no size without the others is not
+/// named either, nor are effects that together take no material part off the held-out force error.
 fn only_named(scales: &Scales, weighed: &mut WeighedModel) -> Option<Shown> {
     let Scales { context, refit, null, holdout, .. } = *scales;
     loop {

@@ -1,5 +1,5 @@
-//! The third stage: where other physics and not noise is most of what a model leaves, shares of the force error select
-//! the effects, and no likelihood rejects them.
+//! The third stage: where other physics and not noise is most of what a model leaves, shares of the
+//! force error select the effects, and no likelihood rejects them.
 
 use super::prepare::Prepared;
 use super::search::{Found, in_its_own_motion};
@@ -28,17 +28,18 @@ use crate::validation::shares::laws::is_by_command;
 use crate::validation::shares::material::Material;
 use crate::validation::shares::select::{Selected, Selection};
 
-/// Part of what is left of the force from which an effect is most of it, so that noise does not limit. On seed 36731 (never looked at
-/// before) it named two effects, both right; on seed 36101 none.
+/// Part of the residual force from which an effect is most of it, so that noise does not limit. On
+/// seed 36731 (never looked at before) it named two effects, both right; on seed 36101 none.
 const MOST_OF_REST: f64 = 0.4;
 /// Factor below which one model leaves clearly less than another.
 const CLEARLY_LESS: f64 = 0.8;
 
 /// The verdict of shares of the force error on the effects that the search found.
 pub(crate) enum ByShares {
-    /// Noise limits, or nothing takes enough: what was found stands as it is.
+    /// Noise limits, or nothing takes enough: what was found stays as it is.
     Nothing,
-    /// The model found explains nearly all down to the noise, and shares name these of its effects too.
+    /// The model found explains nearly all down to the noise, and shares name these of its effects
+    /// too.
     Confirmed(Vec<Material>),
     /// Other physics limits: the effects that shares select.
     Selected {
@@ -49,8 +50,8 @@ pub(crate) enum ByShares {
     },
 }
 
-/// Selects effects by shares of the force error, except where physics without a name surely explains most and takes more than they do
-/// together.
+/// Selects effects by shares of the force error, except where physics without a name surely
+/// explains most and takes more than they do together.
 pub(crate) fn by_shares(prepared: &Prepared, found: &Found) -> ByShares {
     let regime = Regime::of(prepared, found);
     let context = prepared.context(&prepared.fit);
@@ -60,7 +61,8 @@ pub(crate) fn by_shares(prepared: &Prepared, found: &Found) -> ByShares {
     let own: &[Effect] = &found.standing.model.model.effects;
     let grown = selection.grown(TAKEN_SHARE, own);
     let all: Vec<&Effect> = grown.iter().map(|law| &law.effect).collect();
-    // The filter's band may be wider than the regression's: what is little beside the noise in one may be all there is in the other.
+    // The filter's band may be wider than the regression's: what is little beside the noise in one
+    // may be all there is in the other.
     if regime == Regime::Noise && !leaves_clearly_less(&all, own, &selection) {
         return ByShares::Nothing;
     }
@@ -95,8 +97,9 @@ pub(crate) fn by_shares(prepared: &Prepared, found: &Found) -> ByShares {
     }
 }
 
-/// True if shares can confirm an effect that was found next to noise. The forms of the command, which speak against its laws there, are
-/// none that a regression tries, so it has to take most of the force error.
+/// True if shares can confirm an effect that was found next to noise. The forms of the command,
+/// which speak against its laws there, are none that a regression tries, so it has to take most of
+/// the force error.
 fn may_confirm(effect: &Effect, selected: &Selected) -> bool {
     !is_by_command(effect) || (CommandLaw::new(effect).is_none() && selected.share.least() >= MOST_SHARE)
 }
@@ -108,8 +111,9 @@ fn shown(prepared: &Prepared, found: &Found) -> Shown {
     Shown { linear: rig.kind == Kind::Linear, count, ..excitation }
 }
 
-/// True if shares name something new and leave clearly less of the force than what was found, so that noise does not limit. A law that
-/// reshapes the command changes the force that is to be explained: where one was found, shares have to confirm every other effect too.
+/// True if shares name something new and leave clearly less of the force than what was found, so
+/// that noise does not limit. A law that reshapes the command changes the force that is to be
+/// explained: where one was found, shares have to confirm every other effect too.
 fn explains_more(selected: &[Selected], own: &[Effect], selection: &Selection) -> bool {
     let is_same = |one: &Selected, effect: &Effect| one.class().contains(&effect.name);
     let is_new = |one: &Selected| !own.iter().any(|effect| is_same(one, effect));
@@ -121,8 +125,8 @@ fn explains_more(selected: &[Selected], own: &[Effect], selection: &Selection) -
         && leaves_clearly_less(&named, own, selection)
 }
 
-/// True if effects leave clearly less of the force than what was found. A law that reshapes the command may stand for what is new, which
-/// then has to be most of the rest.
+/// True if effects leave clearly less of the force than what was found. A law that reshapes the
+/// command may stand for what is new, which then has to be most of the rest.
 fn leaves_clearly_less(effects: &[&Effect], own: &[Effect], selection: &Selection) -> bool {
     let reshapes = |effect: &Effect| CommandLaw::new(effect).is_some();
     let has_law = |effect: &&Effect| !reshapes(effect) || selection.judges(std::slice::from_ref(*effect));
@@ -150,7 +154,8 @@ fn standing_by_shares(
     ByShares::Selected { with: Box::new(with), alone }
 }
 
-/// Confirms those of the found effects that shares name too, whatever the shape that a regression gives them.
+/// Confirms those of the found effects that shares name too, whatever the shape that a regression
+/// gives them.
 fn as_found(own: &[Effect], materials: Vec<Material>) -> ByShares {
     let confirmed = |one: Material| {
         let name = own.iter().map(|effect| effect.name).find(|name| one.class.contains(name))?;
@@ -172,9 +177,10 @@ fn is_late(effect: &Effect) -> bool {
     matches!(CommandLaw::new(effect), Some(CommandLaw::Delay { .. } | CommandLaw::Lag { .. }))
 }
 
-/// True if a regression can judge all that was found, and it leaves clearly less than what was selected. A law that reshapes or scales the
-/// recorded command shrinks what is to be explained, so what it leaves says nothing here, unless it scales the command and was selected too,
-/// or is one of two that let it act later.
+/// True if a regression can judge all that was found, and it leaves clearly less than what was
+/// selected. A law that reshapes or scales the recorded command shrinks what is to be explained, so
+/// what it leaves says nothing here, unless it scales the command and was selected too, or is one
+/// of two that let it act later.
 fn is_found_closer(prepared: &Prepared, found: &Found, selected: &Found, selection: &Selection) -> bool {
     let model = &found.standing.model.model;
     let own: &[Effect] = &model.effects;
@@ -192,7 +198,8 @@ fn is_found_closer(prepared: &Prepared, found: &Found, selected: &Found, selecti
     is_judged && left(found, &again) < CLEARLY_LESS * left(selected, &selected.standing.model)
 }
 
-/// The effects that were selected, with those found that stand beside them; and those found that do not.
+/// The effects that were selected, with those found that stand beside them; and those found that do
+/// not.
 fn beside(
     found: &Found,
     materials: &[Material],
@@ -259,8 +266,8 @@ impl Regime {
     }
 }
 
-/// Returns why an effect that the search found does not stand beside those selected; none where a regression cannot judge it, or it takes
-/// a material part.
+/// Returns why an effect that the search found does not stand beside those selected; none where a
+/// regression cannot judge it, or it takes a material part.
 fn immaterial(effect: &Effect, selected: &[Selected], selection: &Selection) -> Option<Rejection> {
     let is_clip = matches!(CommandLaw::new(effect), Some(CommandLaw::Clip { .. }));
     if effect.name.definition().coupling().is_some() || is_clip {
@@ -297,8 +304,8 @@ fn standing(
     Found { fit, holdout, null, standing }
 }
 
-/// Ratio of the force that a model leaves to the force that reading whole counts causes under some noise: the smaller one of the fitted
-/// and the held-out recordings.
+/// Ratio of the force that a model leaves to the force that reading whole counts causes under some
+/// noise: the smaller one of the fitted and the held-out recordings.
 fn discrepancy(prepared: &Prepared, found: &Found, model: &FittedModel, noise: &Noise) -> f64 {
     let (nominal, holdout) = (&prepared.nominal, &found.holdout.smoothed);
     let estimator = Estimator::new(&found.fit, noise, prepared.scale);

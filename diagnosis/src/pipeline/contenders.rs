@@ -1,5 +1,5 @@
-//! The models that still contend for a name: each is a whole rig, fitted to the recordings, that an experiment can tell from the
-//! others.
+//! The models that still contend for a name: each is a whole rig, fitted to the recordings, that an
+//! experiment can tell from the others.
 
 use super::assess::Assessment;
 use super::diagnosis::Contender;
@@ -19,7 +19,8 @@ const SCREENED: f64 = 0.1;
 /// The number of effects that are fitted where nothing was found.
 const SCREENED_COUNT: usize = 3;
 
-/// Returns the contenders of the effect that is least decided, the most probable first; none where every name is single.
+/// Returns the contenders of the effect that is least decided, the most probable first; none where
+/// every name is single.
 pub(crate) fn contenders(prepared: &Prepared, assessment: &Assessment) -> Vec<Contender> {
     let weighed = &assessment.weighed;
     let context = prepared.context(&assessment.fit);
@@ -33,7 +34,8 @@ pub(crate) fn contenders(prepared: &Prepared, assessment: &Assessment) -> Vec<Co
     out
 }
 
-/// The effect that explains most among those that are not named alone; one that was dropped where no other is left.
+/// The effect that explains most among those that are not named alone; one that was dropped where
+/// no other is left.
 fn contested(weighed: &WeighedModel) -> Option<&WeighedEffect> {
     let most = |a: &&WeighedEffect, b: &&WeighedEffect| a.found.holdout.sum.total_cmp(&b.found.holdout.sum);
     let is_single = |e: &&WeighedEffect| e.class.len() == 1 && weighed.doubt(e).is_none();

@@ -1,4 +1,5 @@
-//! The fifth stage: the verdict, the effects that are named with their values, and the rigs that follow from it.
+//! The fifth stage: the verdict, the effects that are named with their values, and the rigs that
+//! follow from it.
 
 use super::assess::Assessment;
 use super::contenders::contenders;
@@ -31,7 +32,8 @@ use crate::validation::rejection::Rejection;
 use crate::validation::residual_maps::{self, Map};
 use crate::validation::residuals::{Residuals, above};
 
-/// Decides what is named; `holdout` are the held-out recordings as they were read, `rate_hz` the rows a second of the slowest one.
+/// Decides what is named; `holdout` are the held-out recordings as they were read, `rate_hz` the
+/// rows a second of the slowest one.
 pub(crate) fn decide(
     prepared: &Prepared,
     assessment: &Assessment,
@@ -110,7 +112,8 @@ impl Decision<'_> {
         residual_maps::maps((fit, on_fit), (&holdout.smoothed, on_holdout), turn)
     }
 
-    /// The verdict, and what is left where no effect is named; `maps` are of what the whole model leaves.
+    /// The verdict, and the residual where no effect is named; `maps` are of the residual of the
+    /// whole model.
     fn verdict(&self, maps: &[Map]) -> (Verdict, Option<Reason>) {
         let Assessment { fit, weighed, holdout, excitation, unnamed, foreign, .. } = self.assessment;
         let form = unnamed.is_some().then_some(Reason::FreeForm);
@@ -168,7 +171,8 @@ impl Decision<'_> {
     }
 }
 
-/// Returns the gain of a force of any form: alone where nothing is named, otherwise in addition to the named effects.
+/// Returns the gain of a force of any form: alone where nothing is named, otherwise in addition to
+/// the named effects.
 fn free_form(unnamed: Option<&Unnamed>, beside: Option<&FreeFormShare>) -> Option<FreeForce> {
     let (taken, share_of_ceiling) = match (unnamed, beside) {
         (Some(unnamed), _) => (&unnamed.taken, 0.0),
@@ -193,8 +197,9 @@ fn unexplained_fraction(shown: &Shown, floor: f64) -> f64 {
     if before > 0.0 { (left / before).min(1.0) } else { 0.0 }
 }
 
-/// Returns the weighed effects, their rivals, the hypotheses that were rejected on the way, and what the search found less in than in those,
-/// each effect once. With those that could not be tested and those of the rig it is the whole library.
+/// Returns the weighed effects, their rivals, the hypotheses that were rejected on the way, and
+/// what the search found less in than in those, each effect once. With those that could not be
+/// tested and those of the rig it is the whole library.
 fn hypotheses(
     weighed: &WeighedModel,
     untested: &[(EffectName, String)],

@@ -26,10 +26,11 @@ pub(crate) enum Diagnosis {
     Complete(Box<Complete>),
 }
 
-/// Why recordings cannot tell, or what is left where no effect is named.
+/// Why recordings cannot tell, or the residual where no effect is named.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Reason {
-    /// Something is wrong with the recordings, or they are too short: a sentence from where it was seen.
+    /// Something is wrong with the recordings, or they are too short: a sentence from where it was
+    /// seen.
     Recordings(String),
     /// The rig's model does not describe these recordings at all; it leaves this part of the force.
     Misfit { left: f64 },
@@ -55,7 +56,8 @@ pub(crate) struct Moved {
     pub(crate) late_rows: Option<f64>,
     /// Inertia over gain, over the rig's own.
     pub(crate) inertia_by_gain: f64,
-    /// Distance of that from 1, in standard deviations of the rig's uncertainty; zero where the rig's inertia hardly matters.
+    /// Distance of that from 1, in standard deviations of the rig's uncertainty; zero where the
+    /// rig's inertia hardly matters.
     pub(crate) deviations: f64,
 }
 
@@ -83,7 +85,8 @@ pub(crate) struct Complete {
     pub(crate) unexplained_fraction: f64,
     /// The place of the mismatch, if nothing was named.
     pub(crate) place: Option<Place>,
-    /// The gain of a force of any form: alone where nothing is named, otherwise in addition to the named effects.
+    /// The gain of a force of any form: alone where nothing is named, otherwise in addition to the
+    /// named effects.
     pub(crate) free_form: Option<FreeForce>,
     /// Travel that is to be recorded to fit on.
     pub(crate) beyond_fitted: Option<BeyondFitted>,
@@ -151,7 +154,8 @@ pub(crate) struct FreeForce {
     /// Gain on left-out blocks of the fitted recordings, and its standard error, nats.
     pub(crate) left_out_gain: f64,
     pub(crate) left_out_error: f64,
-    /// Part of what the named effects and this force together take of left-out blocks that the named effects take.
+    /// Part of what the named effects and this force together take of left-out blocks that the
+    /// named effects take.
     pub(crate) share_of_ceiling: f64,
 }
 

@@ -1,9 +1,10 @@
 //! The stages of a diagnosis, one after another: this folder alone sequences them.
 //!
-//! [`prepare`] cuts rig and recordings into blocks and refits the nominal model; [`search`] adds and removes effects; [`by_shares`]
-//! selects them by shares of the force error where other physics and not noise limits; [`assess`] weighs those that stand; [`decide`]
-//! names them, or says why nothing is named. Each stage is one function that takes what the one before it returns, and changes none of
-//! it. What comes out is a [`diagnosis::Diagnosis`].
+//! [`prepare`] cuts rig and recordings into blocks and refits the nominal model; [`search`] adds
+//! and removes effects; [`by_shares`] selects them by shares of the force error where other physics
+//! and not noise limits; [`assess`] weighs those that stand; [`decide`] names them, or says why
+//! nothing is named. Each stage is one function that takes what the one before it returns, and
+//! changes none of it. What comes out is a [`diagnosis::Diagnosis`].
 
 mod assess;
 mod by_shares;
@@ -57,8 +58,8 @@ pub(crate) fn run(
     })
 }
 
-/// Assesses what was found, by shares of the force error where other physics limits; where those name nothing in the end, likelihoods
-/// decide as elsewhere.
+/// Assesses what was found, by shares of the force error where other physics limits; where those
+/// name nothing in the end, likelihoods decide as elsewhere.
 fn assessed(prepared: &Prepared, found: Found) -> Result<Assessment, Reason> {
     match by_shares(prepared, &found) {
         ByShares::Nothing => assess::assess(prepared, found),
@@ -69,8 +70,8 @@ fn assessed(prepared: &Prepared, found: Found) -> Result<Assessment, Reason> {
     }
 }
 
-/// The assessment of what shares selected, `with` what they cannot judge or `alone`, whichever has more of it named; none where nothing is
-/// named or what is named lowers no error.
+/// The assessment of what shares selected, `with` what they cannot judge or `alone`, whichever has
+/// more of it named; none where nothing is named or what is named lowers no error.
 fn by_selected(prepared: &Prepared, with: Found, alone: Option<Box<Found>>) -> Option<Assessment> {
     let all = with.standing.materials.len();
     let assessed = |found| assess::assess(prepared, found).ok();
@@ -94,7 +95,8 @@ fn lowers_error(one: &Assessment) -> bool {
     assess::is_material(&one.named_alone.as_ref().unwrap_or(&one.weighed.shown).table)
 }
 
-/// Why a recording cannot be used, as where a unit or a sign is wrong, with those that still could; none where all can.
+/// Why a recording cannot be used, as where a unit or a sign is wrong, with those that still could;
+/// none where all can.
 fn unusable(all: &[&Recording], rig: &Rig) -> Option<String> {
     let wrong = |recording: &&&Recording| {
         plausibility::mistake(recording, rig).or_else(|| sufficiency::unusable(recording, rig))

@@ -49,7 +49,8 @@ pub(crate) fn patch(given: &Rig, nominal: &Nominal, fit: &[BlockedRecording], la
     rig
 }
 
-/// The effect at `index` of a model with its fitted coefficients in the units of a rig, or with the jumps that were found.
+/// The effect at `index` of a model with its fitted coefficients in the units of a rig, or with the
+/// jumps that were found.
 fn fitted(
     effect: &Effect,
     index: usize,
@@ -139,7 +140,8 @@ pub(crate) fn place(nominal: &Nominal, fit: &[BlockedRecording], last: &FittedMo
     place
 }
 
-/// Returns a variable of a recording, block by block; without its sign where an effect depends on its size.
+/// Returns a variable of a recording, block by block; without its sign where an effect depends on
+/// its size.
 fn states(variable: &str, track: &BlockedRecording, turn: Option<f64>) -> Vec<f64> {
     match variable {
         "command" => track.block_mean(&track.rows.command).iter().map(|u| u.abs()).collect(),

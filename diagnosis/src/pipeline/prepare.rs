@@ -1,4 +1,5 @@
-//! The first stage: recordings cut into blocks, the nominal model refitted, and what both need before any effect is looked for.
+//! The first stage: recordings cut into blocks, the nominal model refitted, and what both need
+//! before any effect is looked for.
 
 use super::Progress;
 use crate::effects::definition::Span;
@@ -103,9 +104,9 @@ struct JumpSearch<'a> {
 }
 
 impl JumpSearch<'_> {
-    /// Looks for lost counts in every recording under the null, and again with the noise that is left without them and with
-    /// the knowledge that counts get lost; gives how many are lost at a time, as travel. Held-out recordings take that, `spread`,
-    /// from the fitted ones.
+    /// Looks for lost counts in every recording under the null, and again with the noise that is
+    /// left without them and with the knowledge that counts get lost; gives how many are lost at a
+    /// time, as travel. Held-out recordings take that, `spread`, from the fitted ones.
     fn find(&self, tracks: &mut [BlockedRecording], mut asked: Asked, spread: Option<f64>) -> Option<f64> {
         let nominal = self.nominal;
         let mut noise = *self.noise;

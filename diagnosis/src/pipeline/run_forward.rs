@@ -1,4 +1,5 @@
-//! The nominal, refitted and patched rig run forward beside the held-out recordings: what people mean by a simulation that fits.
+//! The nominal, refitted and patched rig run forward beside the held-out recordings: what people
+//! mean by a simulation that fits.
 
 use crate::io::recording::Recording;
 use crate::io::rig::Rig;
@@ -18,8 +19,9 @@ pub(crate) fn simulated(nominal: &Rig, refit: &Rig, patched: &Rig, holdout: &[Re
     holdout.iter().map(|recording| Comparison::new(recording, &models, &WINDOWS_S)).collect()
 }
 
-/// True if the patched simulation follows the motion less well than the refitted one in windows of half a second or less, in the geometric
-/// mean over their lengths: a wrong starting speed may spoil the shortest windows of the better simulation.
+/// True if the patched simulation follows the motion less well than the refitted one in windows of
+/// half a second or less, in the geometric mean over their lengths: a wrong starting speed may
+/// spoil the shortest windows of the better simulation.
 pub(crate) fn follows_worse(simulation: &Simulation) -> bool {
     let short = simulation.windows.iter().filter(|w| w.seconds <= 0.5);
     let both = short.filter_map(|w| w.position.patched.zip(w.position.refit));

@@ -1,5 +1,5 @@
-//! The second stage: effects are added one after another as long as one generalises, and what does not stand when all are judged
-//! together is taken out again.
+//! The second stage: effects are added one after another as long as one generalises, and what does
+//! not stand when all are judged together is taken out again.
 
 use super::Progress;
 use super::prepare::Prepared;
@@ -57,7 +57,8 @@ pub(crate) fn search(prepared: &Prepared, progress: Progress) -> Found {
     found
 }
 
-/// The model as far as it has come, under white and under coloured noise, and the motion that goes with it.
+/// The model as far as it has come, under white and under coloured noise, and the motion that goes
+/// with it.
 struct SearchState {
     white: FittedModel,
     slow: FittedModel,
@@ -80,7 +81,8 @@ struct Tried {
 /// The model with one more effect.
 struct Next {
     state: SearchState,
-    /// True if the effect generalises to the held-out recordings; otherwise it is likely to beside another.
+    /// True if the effect generalises to the held-out recordings; otherwise it is likely to beside
+    /// another.
     generalises: bool,
 }
 
@@ -113,7 +115,8 @@ impl Search<'_> {
             if !next.generalises && before.is_some() {
                 break;
             }
-            // Two equally large effects each fail alone, so the best candidate is kept for one more step.
+            // Two equally large effects each fail alone, so the best candidate is kept for one more
+            // step.
             let last = std::mem::replace(&mut now, next.state);
             before = (!next.generalises).then_some(last);
         }
@@ -148,8 +151,8 @@ impl Search<'_> {
         holdout
     }
 
-    /// The model with one more effect, if there is one that generalises or, failing that, promises to; at most `most` may have
-    /// been judged by then.
+    /// The model with one more effect, if there is one that generalises or, failing that, promises
+    /// to; at most `most` may have been judged by then.
     fn with_one_more(&self, now: &SearchState, tried: &mut Tried, most: usize) -> Option<Next> {
         let on = self.context(&now.tracks);
         let candidates = on.screen(&now.white, &|name| !tried.excluded.contains(&name));
@@ -182,7 +185,8 @@ impl Search<'_> {
         promising
     }
 
-    /// Judges a model with one more effect; where it is rejected and `may_promise`, it is kept if it may carry beside another.
+    /// Judges a model with one more effect; where it is rejected and `may_promise`, it is kept if
+    /// it may carry beside another.
     fn judge(&self, now: &SearchState, finalist: FittedModel, may_promise: bool) -> Judged {
         let on = self.context(&now.tracks);
         let with = on.fit_slow(finalist.model.clone(), &[&now.slow.noise, &finalist.noise]);
@@ -213,8 +217,8 @@ impl Search<'_> {
         }
     }
 
-    /// The model with the best set of plain forces, where they gain enough beside `best`, the most that any effect gains, and
-    /// all of them generalise.
+    /// The model with the best set of plain forces, where they gain enough beside `best`, the most
+    /// that any effect gains, and all of them generalise.
     fn with_plain_forces(&self, now: &SearchState, best: f64) -> Option<Next> {
         let on = self.context(&now.tracks);
         for white in best_plain_models(&on, now) {
@@ -254,13 +258,13 @@ enum Judged {
 
 /// Most plain forces taken together.
 const PLAIN_TOGETHER: usize = 3;
-/// Part of what the best of all effects gains that plain friction and weight must gain to be taken before it, and that
-/// forces with a twin in the library must.
+/// Part of what the best of all effects gains that plain friction and weight must gain to be taken
+/// before it, and that forces with a twin in the library must.
 const PLAIN_ENOUGH: f64 = 0.6;
 const PLAIN_NEARLY_ALL: f64 = 0.9;
 
-/// Sets of forces that any machine may have and the rig does not hold, as models. They are looked for together before anything
-/// else: neither of two may show without the other.
+/// Sets of forces that any machine may have and the rig does not hold, as models. They are looked
+/// for together before anything else: neither of two may show without the other.
 fn plain_sets(on: &FitContext) -> Vec<Model> {
     let all = EffectName::ALL.iter().flat_map(|name| candidates::shapes(*name, on.span, on.nominal));
     let ranked = |effect: Effect| Some((effect.name.definition().plain(&effect)?.rank, effect));
@@ -294,8 +298,9 @@ fn best_plain_models(on: &FitContext, now: &SearchState) -> Vec<FittedModel> {
     fitted
 }
 
-/// Fitted recordings smoothed with a model fitted to them, and the model fitted again: what a null leaves out is noise to
-/// its smoother, and next to rest and reversals such a smoother knows neither the speed nor its sign.
+/// Fitted recordings smoothed with a model fitted to them, and the model fitted again: what a null
+/// leaves out is noise to its smoother, and next to rest and reversals such a smoother knows
+/// neither the speed nor its sign.
 pub(super) fn in_its_own_motion(
     tracks: &[BlockedRecording],
     candidate: FittedModel,
@@ -313,8 +318,8 @@ pub(super) fn in_its_own_motion(
 /// Candidates whose gain is this part of the best one's are near ties.
 const NEAR_TIE: f64 = 0.9;
 
-/// Puts near ties in the order of the force that they leave on the fitted recordings: what they gain on the noise of a
-/// null that explains little says less.
+/// Puts near ties in the order of the force that they leave on the fitted recordings: what they
+/// gain on the noise of a null that explains little says less.
 fn order_near_ties(context: &FitContext, before: f64, finalists: &mut [FittedModel]) {
     let Some(best) = finalists.first().map(|c| c.merit - before) else { return };
     let near = finalists.iter().take_while(|c| c.merit - before >= NEAR_TIE * best).count();

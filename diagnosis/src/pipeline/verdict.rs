@@ -1,4 +1,5 @@
-//! The verdict. It rests on all that was weighed, not only on what is named; nothing here changes a model.
+//! The verdict. It rests on all that was weighed, not only on what is named; nothing here changes a
+//! model.
 
 use super::diagnosis::Reason;
 use crate::effects::CommandLaw;
@@ -12,20 +13,22 @@ use crate::validation::confidence_pass::WeighedModel;
 use crate::validation::residual_maps::Map;
 use crate::validation::residuals::{above, refit_matters};
 
-/// Part of the force that must be left, on every recording, to say that the rig's model does not speak of these recordings.
+/// Part of the force that must be left, on every recording, to say that the rig's model does not
+/// speak of these recordings.
 const FOREIGN: f64 = 0.85;
 /// Part of the force that a disturbance must make up before it is called one, beside the noise.
 const DISTURBED: f64 = 0.05;
-/// Part of the refit's mean square that doubtful effects must leave at most for the mismatch to be called repeatable.
+/// Part of the refit's mean square that doubtful effects must leave at most for the mismatch to be
+/// called repeatable.
 const REPEATS: f64 = 0.7;
 
 /// Returns why the rig's model does not describe these recordings at all; none if it does.
 pub(crate) fn misfit(weighed: &WeighedModel, nominal: &Nominal) -> Option<Reason> {
     let table = &weighed.shown.table;
     let force = table.force_rms;
-    // Where the inertia is hardly known the refit alone says little; elsewhere it must explain something, unless what was
-    // found explains nearly all.
-    // A command that is another one explains anything; a plain force that was left out explains what it should.
+    // Where the inertia is hardly known the refit alone says little; elsewhere it must explain
+    // something, unless what was found explains nearly all. A command that is another one explains
+    // anything; a plain force that was left out explains what it should.
     let is_another = weighed.effects.iter().any(|e| CommandLaw::new(&e.found.effect).is_some());
     let refitted = nominal.anchor.is_none() && (is_another || weighed.effects.is_empty());
     let judged = if refitted { table.refit } else { table.patched };
@@ -35,8 +38,9 @@ pub(crate) fn misfit(weighed: &WeighedModel, nominal: &Nominal) -> Option<Reason
     fits_not.then(|| Reason::Misfit { left: judged.holdout / force.holdout.max(1e-300) })
 }
 
-/// The verdict, and what is left where no effect is named; `maps` are of what the whole model leaves,
-/// `foreign` what physics without a name alone would explain, `follows` what a plain regression would.
+/// The verdict, and the residual where no effect is named; `maps` are of the residual of the whole
+/// model, `foreign` what physics without a name alone would explain, `follows` what a plain
+/// regression would.
 pub(crate) fn verdict(
     weighed: &WeighedModel,
     maps: &[Map],
@@ -48,7 +52,8 @@ pub(crate) fn verdict(
     let Shown { on_holdout, table, .. } = &weighed.shown;
     let left = above(table.patched.holdout, weighed.floor, 0.0).sqrt();
     let disturbed = left > DISTURBED * table.force_rms.holdout;
-    // What was found and is too unsure to be named still says that the mismatch repeats, if it explains much of it.
+    // What was found and is too unsure to be named still says that the mismatch repeats, if it
+    // explains much of it.
     let helps =
         !weighed.effects.is_empty() && table.patched.holdout.powi(2) < REPEATS * table.refit.holdout.powi(2);
     let repeats = maps.iter().any(|map| map.significant && map.carries > 0.1);

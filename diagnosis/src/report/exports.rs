@@ -1,4 +1,5 @@
-//! A rig for other simulators. What a format cannot say stands in the file as a note; nothing is left out in silence.
+//! A rig for other simulators. What a format cannot express is a note in the file; nothing is left
+//! out in silence.
 
 use crate::effects::Effect;
 use crate::effects::joint_terms::JointTerms;
@@ -98,11 +99,7 @@ fn joint_of(rig: &Rig) -> JointTerms {
 
 /// Text that may stand in XML, and in its comments.
 fn xml(text: &str) -> String {
-    text.replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('>', "&gt;")
-        .replace('"', "&quot;")
-        .replace("--", "– ")
+    html_report::safe(text).replace("--", "– ")
 }
 
 fn notes(out: &mut String, joint: &JointTerms) {

@@ -5,16 +5,18 @@ use crate::numerics::digits::short;
 
 /// Part of a form's mean square that counts as all of it, in words.
 const MOST: f64 = 0.85;
-/// Part of the mean square that proportion to speed must explain to be told as such: a square of the speed has 0.94.
+/// Part of the mean square that proportion to speed must explain to be reported as such: a square
+/// of the speed has 0.94.
 const PROPORTIONAL: f64 = 0.97;
-/// Part of the mean square that a product of two variables must explain to be told as one.
+/// Part of the mean square that a product of two variables must explain to be reported as one.
 const PRODUCT: f64 = 0.7;
-/// Part of its size over which a form must change to change at all, and part of its range that makes a turn of it.
+/// Part of its size over which a form must change to change at all, and part of its range that
+/// makes a turn of it.
 const CHANGES: f64 = 0.25;
 const TURNS: f64 = 0.2;
 
-/// A grid of places with the force and how often the recordings were there; rows are of the first variable, columns of
-/// the size of the speed or of the second variable.
+/// A grid of places with the force and how often the recordings were there; rows are of the first
+/// variable, columns of the size of the speed or of the second variable.
 struct Sheet {
     rows: Vec<f64>,
     columns: Vec<f64>,
@@ -22,7 +24,8 @@ struct Sheet {
     visits: Vec<Vec<f64>>,
 }
 
-/// The sentence, without a stop; `visits` has one weight per place of the table, `length` is the unit of the coordinate.
+/// The sentence, without a stop; `visits` has one weight per place of the table, `length` is the
+/// unit of the coordinate.
 pub(super) fn sentence(table: &Table, visits: &[f64], length: &str) -> String {
     let speed = table.over.iter().position(|v| *v == Variable::Speed);
     let other = table.over.iter().copied().find(|v| *v != Variable::Speed);
@@ -263,7 +266,8 @@ fn along(variable: Variable, places: &[f64], values: &[(f64, f64)], length: &str
     }
 }
 
-/// Returns the end of each run between turns by more than a threshold, and true if the run was upward; the last is the sequence's end.
+/// Returns the end of each run between turns by more than a threshold, and true if the run was
+/// upward; the last is the sequence's end.
 fn turns(values: &[f64], threshold: f64) -> Vec<(usize, bool)> {
     let mut out = Vec::new();
     let (mut highest, mut lowest) = (0, 0);
@@ -304,7 +308,8 @@ mod tests {
         ahead.iter().rev().map(|v| -v).chain(ahead.iter().copied()).collect()
     }
 
-    /// The sentence of a force over speed, or over another variable and speed; at a speed of zero the side counts.
+    /// The sentence of a force over speed, or over another variable and speed; at a speed of zero
+    /// the side counts.
     fn told(other: Option<(Variable, Vec<f64>)>, force: impl Fn(f64, f64, f64) -> f64) -> String {
         let columns = speeds();
         let rows = other.as_ref().map_or(vec![0.0], |(_, places)| places.clone());

@@ -5,9 +5,11 @@ use crate::io::rig::Kind;
 use crate::io::schema::FreeForm;
 use crate::numerics::digits::short;
 use crate::pipeline::diagnosis::FreeForce;
-use crate::report::axes::{close, frame, safe};
 use crate::report::form_in_words;
 use crate::selection::free_form::Shape;
+use html_report::drawing::path;
+use html_report::plot::{close, frame};
+use html_report::safe;
 use std::fmt::Write as _;
 
 /// The form in a sentence without a stop.
@@ -96,14 +98,9 @@ pub(crate) fn draw(out: &mut String, shape: &Shape, told: &FreeForm, force: &str
     for (k, line) in lines.iter().enumerate() {
         let turn = 200 + 130 * k / lines.len();
         let _ = write!(out, "<path style=\"fill:hsl({turn} 60% 50%/.18)\" d=\"");
-        let edge = |out: &mut String, p: &(f64, f64, f64), sign: f64, pen: char| {
-            let (x, y) = at(p.0, p.1 + sign * p.2);
-            let _ = write!(out, "{pen}{x:.1} {y:.1}");
-        };
-        for (i, p) in line.places.iter().enumerate() {
-            edge(out, p, 1.0, if i == 0 { 'M' } else { 'L' });
-        }
-        line.places.iter().rev().for_each(|p| edge(out, p, -1.0, 'L'));
+        let at = &at;
+        let edge = |sign: f64| move |p: &(f64, f64, f64)| Some(at(p.0, p.1 + sign * p.2));
+        path(out, line.places.iter().map(edge(1.0)).chain(line.places.iter().rev().map(edge(-1.0))));
         let name = match (line.at, other) {
             (Some(value), Some(other)) => format!("at a {} of {}", other.in_words(), short(value)),
             _ => "force".to_owned(),
@@ -113,9 +110,7 @@ pub(crate) fn draw(out: &mut String, shape: &Shape, told: &FreeForm, force: &str
             "Z\"/><path class=line data-name=\"{}\" style=\"stroke:hsl({turn} 60% 50%)\" d=\"",
             safe(&name)
         );
-        for (i, p) in line.places.iter().enumerate() {
-            edge(out, p, 0.0, if i == 0 { 'M' } else { 'L' });
-        }
+        path(out, line.places.iter().map(edge(0.0)));
         out.push_str("\"/>");
     }
     close(out, &x_label);

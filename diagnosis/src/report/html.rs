@@ -1,21 +1,20 @@
-//! `report.html`: one page without network, for a desktop and a phone. Plain SVG drawn here; `plot.js` shows the values under the
-//! pointer.
+//! `report.html`: one page without network, for a desktop and a phone. Plain SVG drawn here; the
+//! script of [`html_report::plot`] shows the values under the pointer.
 
 use crate::io::recording::shown_at;
 use crate::io::rig::Kind;
 use crate::io::schema::{Hypothesis, Named, Verdict};
 use crate::numerics::digits::short;
 use crate::pipeline::diagnosis::Series;
-use crate::report::axes::{HIGH, close, frame, safe};
 use crate::report::free_form;
 use crate::report::motion_picture;
 use crate::report::outcome::{Outcome, unit};
 use crate::report::simulation_page;
 use crate::validation::residual_maps::Map;
+use html_report::drawing::path;
+use html_report::plot::{HIGH, close, frame};
+use html_report::safe;
 use std::fmt::Write as _;
-
-const STYLE: &str = include_str!("report.css");
-const SCRIPT: &str = include_str!("plot.js");
 
 /// The page.
 pub(crate) fn page(outcome: &Outcome) -> String {
@@ -23,10 +22,8 @@ pub(crate) fn page(outcome: &Outcome) -> String {
     let mut out = String::with_capacity(200_000);
     let _ = write!(
         out,
-        "<!doctype html><html lang=en><head><meta charset=utf-8><meta name=viewport content=\"width=device-width,initial-scale=1\">\
-         <title>Diagnosis: {}</title><style>{STYLE}</style></head><body><main><p class=rig>{}</p><h1>{}.</h1>\
+        "<p class=rig>{}</p><h1>{}.</h1>\
          <dl class=short><dt>What remains</dt><dd>{}.</dd><dt>Record next</dt><dd>{}.</dd>{}</dl>",
-        safe(&outcome.evidence.rig),
         safe(&outcome.evidence.rig),
         safe(&r.sentence),
         safe(&r.remains),
@@ -47,8 +44,7 @@ pub(crate) fn page(outcome: &Outcome) -> String {
     }
     next(&mut out, outcome);
     footer(&mut out, outcome);
-    let _ = writeln!(out, "</main><script>{SCRIPT}</script></body></html>");
-    out
+    simulation_page::whole(&format!("Diagnosis: {}", outcome.evidence.rig), &out)
 }
 
 /// The motion that the simulation gives beside the one that was recorded.
@@ -116,7 +112,7 @@ fn next(out: &mut String, outcome: &Outcome) {
     }
     if !r.effects.is_empty() || outcome.evidence.form.is_some() {
         items.push(format!(
-            "Simulate with what was found: `patched-rig.toml` beside this page is the rig with it; \
+            "Simulate with what was found: `patched-rig.toml` next to this page is the rig with it; \
              `host-sim simulate --rig patched-rig.toml --recording {holdout} --out simulated` runs it."
         ));
         items.push(
@@ -338,17 +334,8 @@ fn draw(out: &mut String, map: &Map, unit: &str, length: &str) {
     let at = frame(out, (low, high), (-top, top), &x_label, &format!("residual force, {unit}"));
     for (class, name, column) in [("f", "forward", &map.forward), ("r", "backward", &map.backward)] {
         let _ = write!(out, "<path class=\"line {class}\" data-name={name} d=\"");
-        let mut pen = 'M';
-        for (value, edges) in column.iter().zip(map.edges.windows(2)) {
-            match value {
-                Some(value) => {
-                    let (x, y) = at(0.5 * (edges[0] + edges[1]), *value);
-                    let _ = write!(out, "{pen}{x:.1} {y:.1}");
-                    pen = 'L';
-                }
-                None => pen = 'M',
-            }
-        }
+        let places = map.edges.windows(2).map(|edges| 0.5 * (edges[0] + edges[1]));
+        path(out, column.iter().zip(places).map(|(value, x)| value.map(|value| at(x, value))));
         out.push_str("\"/>");
     }
     let carries = if map.significant {

@@ -1,6 +1,5 @@
 //! Sentences, pages and files of a finished diagnosis. Nothing here fits.
 
-pub(crate) mod axes;
 pub mod exports;
 mod form_in_words;
 pub(crate) mod free_form;

@@ -1,8 +1,11 @@
-//! The picture of "simulation and recording differ": the motions beside each other, drawn, tabulated and as a file.
+//! The picture of "simulation and recording differ": the motions side by side, drawn, tabulated and
+//! as a file.
 
 use crate::numerics::digits::short;
-use crate::report::axes::{HIGH, close, frame, safe};
 use crate::simulation::comparison::{AFRESH_S, Comparison, Figures, Off, Simulated};
+use html_report::drawing::path;
+use html_report::plot::{HIGH, close, frame};
+use html_report::safe;
 use std::fmt::Write as _;
 
 /// Points that a line is drawn with.
@@ -31,7 +34,8 @@ pub(crate) fn words(model: &str) -> &str {
     }
 }
 
-/// A line through points; it is interrupted where it leaves the picture and wherever the simulation is started `afresh`, s.
+/// A line through points; it is interrupted where it leaves the picture and wherever the simulation
+/// is started `afresh`, s.
 fn line(
     out: &mut String,
     (class, name): (&str, &str),
@@ -44,16 +48,12 @@ fn line(
     let part = |t: f64| afresh.map_or(0, |seconds| (t / seconds) as u64);
     let _ = write!(out, "<path class=\"motion {class}\" data-name=\"{}\" d=\"", safe(name));
     let mut last = None;
-    for (t, x) in time.iter().zip(values).step_by(every) {
-        let (px, py) = at(*t, *x);
-        if py <= 0.0 || py >= HIGH {
-            last = None;
-            continue;
-        }
-        let pen = if last == Some(part(*t)) { 'L' } else { 'M' };
-        let _ = write!(out, "{pen}{px:.1} {py:.1}");
-        last = Some(part(*t));
-    }
+    let shown = time.iter().zip(values).step_by(every).flat_map(|(t, x)| {
+        let place = Some(at(*t, *x)).filter(|(_, y)| *y > 0.0 && *y < HIGH);
+        let is_new = last.replace(part(*t)) != Some(part(*t));
+        is_new.then_some(None).into_iter().chain([place])
+    });
+    path(out, shown);
     out.push_str("\"/>");
 }
 
@@ -66,8 +66,8 @@ fn bulk(values: &[f64]) -> (f64, f64) {
     (sorted[few], sorted[last - few])
 }
 
-/// The range of a picture: what was recorded with some room, and up to half as much again for the simulations: one that runs
-/// away leaves the picture.
+/// The range of a picture: what was recorded with some room, and up to half as much again for the
+/// simulations: one that runs away leaves the picture.
 fn range(recorded: &[f64], models: &[(&str, &[f64])]) -> (f64, f64) {
     let (low, high) = bulk(recorded);
     let span = (high - low).max(1e-12);
@@ -123,7 +123,8 @@ fn columns<'a>(
     models.filter_map(|m| Some((m.model.as_str(), pick(m)?))).collect()
 }
 
-/// Position of some of the models in short windows started from the measured state, and how far off it is there.
+/// Position of some of the models in short windows started from the measured state, and how far off
+/// it is there.
 pub(crate) fn in_windows(out: &mut String, compared: &Comparison, wanted: &[&str]) {
     let length = compared.kind.length();
     let motion = &compared.motion;
@@ -195,7 +196,7 @@ pub(crate) fn under_reference(out: &mut String, compared: &Comparison, wanted: &
     let Some(feedback) = compared.feedback else { return };
     let _ = write!(
         out,
-        "<h2>Under the recorded reference</h2><p class=note>The loop that ran was told from its reference; it explains {:.0} % of the \
+        "<h2>Under the recorded reference</h2><p class=note>The loop that ran was recognised from its reference; it explains {:.0} % of the \
          command. What else the command held stays as recorded.</p>",
         100.0 * feedback.explained
     );
@@ -233,8 +234,8 @@ fn position(off: Off, unit: &str) -> String {
     format!("{} {unit}", short(off.position_rms))
 }
 
-/// Returns the factor and the name of the unit for position errors: thousandths of the unit where some errors are below a
-/// thousandth.
+/// Returns the factor and the name of the unit for position errors: thousandths of the unit where
+/// some errors are below a thousandth.
 pub(crate) fn scale(compared: &Comparison) -> (f64, String) {
     let unit = compared.kind.length();
     let figures = compared.models.iter().map(|m| &m.figures);

@@ -9,7 +9,7 @@ pub(crate) fn separating(class: &[N]) -> Option<String> {
     if class.len() < 2 {
         return None;
     }
-    // The name that stands first knows best.
+    // The first name knows best.
     let text = class.iter().find_map(|name| {
         let others = class.iter().filter(|other| *other != name);
         others.clone().find_map(|other| name.definition().experiment(*other))

@@ -1,10 +1,12 @@
-//! Notes on a refit that a reader has to know: commands that act early or late, an inertia far from the rig's.
+//! Notes on a refit that a reader has to know: commands that act early or late, an inertia far from
+//! the rig's.
 
 use crate::pipeline::diagnosis::Moved;
 
 /// Standard deviations from which a value far from the rig's is told.
 const FAR: f64 = 2.0;
-/// Rows by which commands act early or late from which that is told: a hundredth is the last digit shown.
+/// Rows by which commands act early or late from which that is told: a hundredth is the last digit
+/// shown.
 const SKEWED: f64 = 0.005;
 
 /// The notes, each a clause.

@@ -1,13 +1,15 @@
-//! The second and the third line of a report: how much remains against the sensor's noise, and what to record next.
+//! The second and the third line of a report: how much remains against the sensor's noise, and what
+//! to record next.
 
 use crate::io::schema::{Report, Verdict};
 
-/// The residual over the sensor's noise from which there is more to be found, and below which there is nothing.
+/// The residual over the sensor's noise from which there is more to be found, and below which there
+/// is nothing.
 pub(crate) const MORE: f64 = 3.0;
 const NOTHING: f64 = 1.5;
 
-/// The patched model's residual on held-out recordings, over the residual that the sensor's noise alone causes; none where
-/// nothing was fitted, or the sensor has no noise to speak of.
+/// The patched model's residual on held-out recordings, over the residual that the sensor's noise
+/// alone causes; none where nothing was fitted, or the sensor has no noise to speak of.
 pub(crate) fn of_noise(report: &Report) -> Option<f64> {
     let ratio = report.fit.patched.holdout / report.noise_floor;
     ratio.is_finite().then_some(ratio)

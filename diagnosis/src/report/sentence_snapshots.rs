@@ -1,4 +1,5 @@
-//! The sentence of every verdict, word for word: people read them, and whoever changes one sees it here.
+//! The sentence of every verdict, word for word: people read them, and whoever changes one sees it
+//! here.
 
 use crate::effects::EffectName as N;
 use crate::io::rig::{Kind, Rig};
@@ -19,7 +20,7 @@ fn named(name: N, confidence: f64, class: &[N], states: Vec<Region>) -> Named {
     }
 }
 
-/// A report of a verdict over a force of 1 N·m: 0.4 stands, 0.2 refitted, 0.05 patched.
+/// A report of a verdict over a force of 1 N·m: 0.4 nominal, 0.2 refitted, 0.05 patched.
 fn report(verdict: Verdict, reason: Option<&str>, effects: Vec<Named>) -> Report {
     let mut report = Outcome::cannot_tell(
         &Rig::of_values(1e-3, 1e-3, 1e-2),

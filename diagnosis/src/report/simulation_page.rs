@@ -1,20 +1,19 @@
-//! The page of `simulate`: the sentence, simulated against recorded motion, force, and what to do next.
+//! The page of `simulate`: the sentence, simulated against recorded motion, force, and what to do
+//! next.
 
 use crate::numerics::digits::short;
-use crate::report::axes::safe;
 use crate::report::motion_picture::{force, free_run, in_windows, scale, table, under_reference, words};
 use crate::simulation::comparison::{Comparison, Simulated};
+use html_report::{document, plot, safe};
 use std::fmt::Write as _;
 
-const STYLE: &str = include_str!("report.css");
-const SCRIPT: &str = include_str!("plot.js");
-
-/// The length of the windows by which models are compared in a sentence, s, where they were run: short enough that errors of
-/// force do not add up, long enough that the sensor's noise is none.
+/// The length of the windows by which models are compared in a sentence, s, where they were run:
+/// short enough that errors of force do not add up, long enough that the sensor's noise does not
+/// matter.
 const JUDGING_S: f64 = 0.5;
 
-/// Returns the position errors of the models as one sentence without its full stop: in windows, or in the free run of a recording
-/// too short for any.
+/// Returns the position errors of the models as one sentence without its full stop: in windows, or
+/// in the free run of a recording too short for any.
 pub fn sentence(compared: &Comparison) -> String {
     let (factor, unit) = scale(compared);
     let windows = compared.models.first().map_or(&[][..], |m| &m.figures.windows);
@@ -26,7 +25,7 @@ pub fn sentence(compared: &Comparison) -> String {
         .map(|m| {
             let off = format!("{} {unit}", short(factor * off(m)));
             match m.model.as_str() {
-                "nominal" => format!("{off} as the simulation stands"),
+                "nominal" => format!("{off} with the simulation as it is"),
                 other => format!("{off} {}", words(other)),
             }
         })
@@ -50,18 +49,12 @@ pub fn sentence(compared: &Comparison) -> String {
     format!("{over}, the simulated position is off by {all} (root mean square)")
 }
 
-/// The page. `notes` are sentences without their full stop that a reader has to mind; `next` says what to do, one item each, as
-/// plain text in which `backticks` mark commands.
+/// The page. `notes` are sentences without their full stop that a reader has to mind; `next` says
+/// what to do, one item each, as plain text in which `backticks` mark commands.
 pub fn page(title: &str, compared: &[Comparison], notes: &[String], next: &[String]) -> String {
     let mut out = String::with_capacity(400_000);
     let first = compared.first().map_or_else(|| "Nothing was simulated".to_owned(), sentence);
-    let _ = write!(
-        out,
-        "<!doctype html><html lang=en><head><meta charset=utf-8><meta name=viewport content=\"width=device-width,initial-scale=1\">\
-         <title>Simulated: {0}</title><style>{STYLE}</style></head><body><main><p class=rig>{0}</p><h1>{1}.</h1>",
-        safe(title),
-        safe(&first)
-    );
+    let _ = write!(out, "<p class=rig>{}</p><h1>{}.</h1>", safe(title), safe(&first));
     for note in notes {
         let _ = write!(out, "<p class=next><b>Warning:</b> {}.</p>", safe(note));
     }
@@ -76,8 +69,12 @@ pub fn page(title: &str, compared: &[Comparison], notes: &[String], next: &[Stri
         out.push_str("</section>");
     }
     what_next(&mut out, next);
-    let _ = writeln!(out, "</main><script>{SCRIPT}</script></body></html>");
-    out
+    whole(&format!("Simulated: {title}"), &out)
+}
+
+/// Returns a page in the style of the reports, with the values of its plots under the pointer.
+pub(crate) fn whole(title: &str, body: &str) -> String {
+    document(title, include_str!("report.css"), body, Some(plot::SCRIPT))
 }
 
 /// The last part of a page: what to do next. Text between `backticks` is a command.
@@ -129,7 +126,7 @@ mod tests {
         let said = sentence(&compared);
         assert!(
             said.starts_with("In windows of 1 s of bench.csv, the simulated position is off by ")
-                && said.contains(" as the simulation stands and ")
+                && said.contains(" with the simulation as it is and ")
                 && said.ends_with(" with what was found (root mean square)"),
             "{said}"
         );

@@ -1,4 +1,5 @@
-//! The clauses of a report that say why an effect is not named, and why nothing is; `outcome` makes the headline. Nothing reads one to decide.
+//! The clauses of a report that say why an effect is not named, and why nothing is; `outcome` makes
+//! the headline. Nothing reads one to decide.
 
 use crate::numerics::bootstrap::Gain;
 use crate::pipeline::diagnosis::Reason;
@@ -100,8 +101,8 @@ fn weakness(weakest: &Weakness) -> String {
     }
 }
 
-/// Why recordings cannot tell, or what is left where no effect is named; `form` is the force of any form, in words, where there
-/// is one.
+/// Why recordings cannot tell, or the residual where no effect is named; `form` is the force of any
+/// form, in words, where there is one.
 pub(crate) fn reason(why: &Reason, form: Option<&str>) -> String {
     let sentence = match why {
         Reason::Recordings(sentence) => sentence.clone(),

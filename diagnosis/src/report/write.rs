@@ -7,8 +7,9 @@ use std::io;
 use std::path::Path;
 
 impl Outcome {
-    /// Writes `diagnosis.json`, `report.html`, `patched-rig.toml`, the rigs that lead to it and `residuals.csv`, each whole or not at
-    /// all, and the rigs of the contenders in a folder `contenders`.
+    /// Writes `diagnosis.json`, `report.html`, `patched-rig.toml`, the rigs that lead to it and
+    /// `residuals.csv`, each whole or not at all, and the rigs of the contenders in a folder
+    /// `contenders`.
     pub fn write(&self, dir: &Path) -> io::Result<()> {
         std::fs::create_dir_all(dir)?;
         let json = serde_json::to_string_pretty(&self.report).map_err(io::Error::other)?;

@@ -1,4 +1,5 @@
-//! The candidate shapes of each effect for given recordings: the grids from which refinement starts.
+//! The candidate shapes of each effect for given recordings: the grids from which refinement
+//! starts.
 
 use crate::effects::definition::{Believed, Movable, NominalTerm, Span};
 use crate::effects::{Effect, EffectName as N};
@@ -26,7 +27,8 @@ fn varies(columns: impl Iterator<Item = Option<f64>>) -> bool {
     high - low > 1e-9 * (high.abs() + low.abs()).max(1e-300)
 }
 
-/// Returns the range of recordings whose motion is smoothed, with the rig's statement of their machine.
+/// Returns the range of recordings whose motion is smoothed, with the rig's statement of their
+/// machine.
 pub(crate) fn span_of(tracks: &[BlockedRecording], nominal: &Nominal) -> Span {
     let mut speeds: Vec<f64> = tracks.iter().flat_map(|t| t.motion.v.iter().map(|v| v.abs())).collect();
     speeds.sort_by(f64::total_cmp);
@@ -79,15 +81,17 @@ pub(crate) fn span_of(tracks: &[BlockedRecording], nominal: &Nominal) -> Span {
     span
 }
 
-/// Smallest part of the largest command at which a drive may clip, where its inertia is known and where it is hardly known.
+/// Smallest part of the largest command at which a drive may clip, where its inertia is known and
+/// where it is hardly known.
 const LEAST_CLIP: f64 = 0.27;
 const LEAST_CLIP_ANCHORED: f64 = 0.45;
 /// Times the dry friction that a drive which moves an axis carries at least.
 const CARRIES: f64 = 2.0;
 
-/// The smallest part of the largest command, `most`, at which a drive may clip. How far beyond a clip commands go says nothing of the drive,
-/// as a servo that waits for a clipped drive asks for any amount: a clip may also lie as low as the median command, if that is clearly
-/// more than dry friction, which is `dry` as a command.
+/// The smallest part of the largest command, `most`, at which a drive may clip. How far beyond a
+/// clip commands go says nothing of the drive, as a servo that waits for a clipped drive asks for
+/// any amount: a clip may also lie as low as the median command, if that is clearly more than dry
+/// friction, which is `dry` as a command.
 fn least_clip(tracks: &[BlockedRecording], is_anchored: bool, most: f64, dry: f64) -> f64 {
     if is_anchored {
         return LEAST_CLIP_ANCHORED;
@@ -110,7 +114,8 @@ fn column(values: &Option<Vec<f64>>) -> impl Iterator<Item = Option<f64>> + '_ {
 
 /// Turns over which an axis runs on rather than to and fro: a law of the travel is of a stroke.
 const RUNS_ON: f64 = 100.0;
-/// Part of the travel within which recordings must start for a law of the travel to be the same in all.
+/// Part of the travel within which recordings must start for a law of the travel to be the same in
+/// all.
 const SAME_PLACE: f64 = 0.3;
 
 /// True if a law of the travel may hold for all recordings.
@@ -122,8 +127,8 @@ fn has_stroke(span: &Span, nominal: &Nominal) -> bool {
     }
 }
 
-/// The shapes of an effect to start from; none where the recordings cannot show it or the rig holds it already.
-/// Periodic effects and missed counts are sought in a way of their own.
+/// The shapes of an effect to start from; none where the recordings cannot show it or the rig holds
+/// it already. Periodic effects and missed counts are sought in a way of their own.
 pub(crate) fn shapes(name: N, span: &Span, nominal: &Nominal) -> Vec<Effect> {
     if nominal.holds(name) || !is_seen(name, nominal) {
         return Vec::new();
@@ -141,8 +146,9 @@ pub(crate) fn movable(effect: &Effect, span: &Span) -> Vec<Movable> {
     effect.name.definition().movable(effect, span)
 }
 
-/// True if a drift is at the end of what may be told from something else: what settles at once cannot be told from how a recording begins,
-/// and what has hardly begun at its end is any slow change.
+/// True if a drift is at the end of what may be distinguished from something else: what settles at
+/// once cannot be distinguished from how a recording begins, and what has hardly begun at its end
+/// is any slow change.
 pub(crate) fn is_at_end(effect: &Effect, span: &Span) -> bool {
     effect.name.definition().drifts()
         && movable(effect, span).iter().any(|(key, low, high)| {
@@ -151,7 +157,8 @@ pub(crate) fn is_at_end(effect: &Effect, span: &Span) -> bool {
         })
 }
 
-/// Part of the travel over which an effect gives way after a reversal, where that is more than bristles do: such a spring creeps.
+/// Part of the travel over which an effect gives way after a reversal, where that is more than
+/// bristles do: such a spring creeps.
 pub(crate) fn creeps(effect: &Effect, span: &Span) -> Option<f64> {
     let part = effect.name.definition().gives_way_over(effect)? / span.travel();
     (part > BRISTLES).then_some(part)
@@ -168,7 +175,8 @@ mod tests {
     use crate::io::recording::Recording;
     use crate::io::rig::Rig;
 
-    /// Two seconds in which an axis is driven to and fro, then a second that goes on or is mirrored, as its command is.
+    /// Two seconds in which an axis is driven to and fro, then a second that goes on or is
+    /// mirrored, as its command is.
     fn followed(is_mirrored: bool, knows: Knows) -> (BlockedRecording, Nominal, Total) {
         let time_s: Vec<f64> = (0..3001).map(|row| f64::from(row) * 1e-3).collect();
         let after = |t: f64, x: f64, at: f64| if is_mirrored && t > 2.0 { 2.0 * at - x } else { x };
@@ -194,7 +202,8 @@ mod tests {
 
     const NOISE: Noise = Noise { sensor: 1.0, white: 10.0, slow: 1e-3, tau: 0.1, rest: 1.0, blur: 0.0 };
 
-    /// Largest difference of what an effect puts into the blocks before `until`, over its largest value there.
+    /// Largest difference of what an effect puts into the blocks before `until`, over its largest
+    /// value there.
     fn difference(a: &Input, b: &Input, until: usize) -> f64 {
         let columns = |input: &Input| match input {
             Input::Held(x) | Input::Sensor(x) => vec![x[..until].to_vec()],
@@ -212,7 +221,8 @@ mod tests {
         let farthest = |name: N, knows: Knows| {
             let [(a, nominal, total), (b, _, other)] =
                 [false, true].map(|is_mirrored| followed(is_mirrored, knows));
-            // An acceleration takes the neighbours of its block, a second mass those between which its speed lies.
+            // An acceleration takes the neighbours of its block, a second mass those on both sides
+            // of its speed.
             let until = a.blocks.start.partition_point(|start| *start < 2.0) - 3;
             let before = |total: &Total| {
                 Gains::new(&a.observed(), &NOISE).innovations(&a.observed(), total)[..until].to_vec()
@@ -277,7 +287,8 @@ mod tests {
             [N::PositionSpring, N::PositionDependentFriction, N::PositionDependentDamping].map(any)
         };
         assert_eq!(is_looked_for(Some(1.0)), [true; 3]);
-        // A spring pulls in proportion to the travel from anywhere: each recording's own offset takes up where it starts.
+        // A spring pulls in proportion to the travel from anywhere: each recording's own offset
+        // takes up where it starts.
         assert_eq!(
             is_looked_for(Some(15.0)),
             [true, false, false],

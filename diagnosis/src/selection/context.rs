@@ -1,4 +1,5 @@
-//! The context of every search: the recordings with their nominal model, and fits of a model to them.
+//! The context of every search: the recordings with their nominal model, and fits of a model to
+//! them.
 
 use crate::effects::Effect;
 use crate::effects::definition::Span;
@@ -31,8 +32,8 @@ pub(crate) struct FitContext<'a> {
     pub(crate) scale: f64,
 }
 
-/// Cost of one fitted value in log-likelihood: half the logarithm of the number of independent stretches is
-/// about 3; shapes are searched and cost more.
+/// Cost of one fitted value in log-likelihood: half the logarithm of the number of independent
+/// stretches is about 3; shapes are searched and cost more.
 pub(crate) const PER_COEFFICIENT: f64 = 2.5;
 const PER_SHAPE: f64 = 4.0;
 /// Most effects that are named together.
@@ -56,8 +57,9 @@ impl FitContext<'_> {
         FittedModel { model, noise, fit, merit }
     }
 
-    /// Fits a model whose values are shown. Where shares of the force error select, its values are fitted to the force in the band that
-    /// people see: likelihoods count what is fast most, where a machine is least like its model.
+    /// Fits a model whose values are shown. Where shares of the force error select, its values are
+    /// fitted to the force in the band that people see: likelihoods count what is fast most, where
+    /// a machine is least like its model.
     pub(crate) fn fit_shown(&self, model: Model, from: &Noise, by_shares: bool) -> FittedModel {
         let white = self.fit(model, from, Colour::White);
         if by_shares { self.fit_in_band(white) } else { white }
@@ -82,14 +84,15 @@ impl FitContext<'_> {
         FittedModel { model, noise: *noise, fit, merit }
     }
 
-    /// The best of fits under coloured noise from several starts: where the noise may be slow, what a model explains and
-    /// what a disturbance explains are two optima.
+    /// The best of fits under coloured noise from several starts: where the noise may be slow, what
+    /// a model explains and what a disturbance explains are two optima.
     pub(crate) fn fit_slow(&self, model: Model, starts: &[&Noise]) -> FittedModel {
         let fits = parallel::map_all(starts, |from| self.fit(model.clone(), from, Colour::Slow));
         fits.into_iter().max_by(|a, b| a.merit.total_cmp(&b.merit)).expect("at least one start")
     }
 
-    /// Log-likelihood of a model's fit under some noise, where its last effect may be what its shape says.
+    /// Log-likelihood of a model's fit under some noise, where its last effect may be what its
+    /// shape says.
     pub(crate) fn merit_of(&self, model: &Model, noise: &Noise) -> f64 {
         let effect = model.effects.last().expect("there is an effect to polish");
         let effective = effective_commands(self.tracks, &model.effects);

@@ -1,4 +1,5 @@
-//! The range of speeds and amplitudes in recordings. Effects that look alike within it cannot be told apart.
+//! The range of speeds and amplitudes in recordings. Effects that look alike within it cannot be
+//! distinguished.
 
 use crate::effects::definition::Shown;
 use crate::estimation::blocked_recording::BlockedRecording;
@@ -14,7 +15,8 @@ pub(crate) struct Excitation {
     pub(crate) turns: f64,
 }
 
-/// Speeds within this factor are one speed: dry, viscous, quadratic and falling friction all fit it.
+/// Speeds within this factor are one speed: dry, viscous, quadratic and falling friction all fit
+/// it.
 const ONE_SPEED: f64 = 3.0;
 /// Strokes within this factor have one length: bristles and a gap both fit it.
 const ONE_LENGTH: f64 = 3.0;
@@ -55,7 +57,8 @@ fn strokes(track: &BlockedRecording, least: f64) -> Vec<f64> {
 }
 
 impl Excitation {
-    /// Measures recordings whose motion is smoothed; `count` is one of the encoder's and `turn` the motor's, rad or m.
+    /// Measures recordings whose motion is smoothed; `count` is one of the encoder's and `turn` the
+    /// motor's, rad or m.
     pub(crate) fn of(tracks: &[BlockedRecording], count: f64, turn: Option<f64>) -> Self {
         let moving = |track: &BlockedRecording| -> Vec<f64> {
             track

@@ -1,12 +1,12 @@
-//! The search for the joint between a motor and its load: the values of its law go together, have many optima, and lean on
-//! the rest of the machine. What is here moves shapes; it chooses between no effects.
+//! The search for the joint between a motor and its load: the values of its law go together, have
+//! many optima, and lean on the rest of the machine. What is here moves shapes; it chooses between
+//! no effects.
 
-use crate::effects::Effect;
+use crate::effects::{Effect, WholeMachine};
 use crate::estimation::filter::Noise;
 use crate::estimation::fit::Fit;
 use crate::estimation::model::Model;
 use crate::estimation::noise::Colour;
-use crate::estimation::nominal::Machine;
 use crate::numerics::parallel;
 use crate::selection::candidates;
 use crate::selection::context::{FitContext, FittedModel};
@@ -21,7 +21,7 @@ const ENOUGH: f64 = 1.0;
 
 /// True if the law of an effect is built on the rest of the machine.
 pub(crate) fn is_joint(effect: &Effect) -> bool {
-    effect.shape.contains_key("per_command")
+    effect.is_joint()
 }
 
 fn ends_in_joint(model: &Model) -> bool {
@@ -47,7 +47,8 @@ fn elsewhere(context: &FitContext, model: &Model) -> Vec<Model> {
     out
 }
 
-/// The best model that ways downhill from other places lead to, with its merit; none where the last effect is no joint.
+/// The best model that ways downhill from other places lead to, with its merit; none where the last
+/// effect is no joint.
 pub(crate) fn search(
     context: &FitContext,
     model: &Model,
@@ -72,20 +73,15 @@ pub(crate) fn search(
 }
 
 /// The model with its joint on another machine.
-fn on(machine: &Machine, model: &Model) -> Model {
+fn on(machine: &WholeMachine, model: &Model) -> Model {
     let mut on = model.clone();
-    let shape = &mut on.effects.last_mut().expect("there is a joint").shape;
-    // The force at which a grip lets go stays as it is.
-    let scale = shape["per_command"] / machine.per_command;
-    if let Some(limit) = shape.get_mut("limit") {
-        *limit *= scale;
-    }
-    shape.extend(machine.shape().map(|(key, value)| (key.to_owned(), value)));
+    on.effects.last_mut().expect("there is a joint").put_on(machine);
     on
 }
 
-/// Gives the law of a joint the machine and the standing forces that were fitted with it, where it began with others, and moves
-/// its shape again, for as long as that helps; a model without one stays as it is.
+/// Gives the law of a joint the machine and the standing forces that were fitted with it, where it
+/// began with others, and moves its shape again, for as long as that helps; a model without one
+/// stays as it is.
 pub(crate) fn settle(
     context: &FitContext,
     (mut best, mut model): (f64, Model),

@@ -1,5 +1,5 @@
-//! The candidate effects, the best shape of each, and the comparison of models on the fitted recordings. Nothing here
-//! sees a held-out recording.
+//! The candidate effects, the best shape of each, and the comparison of models on the fitted
+//! recordings. Nothing here sees a held-out recording.
 
 pub(crate) mod candidates;
 pub(crate) mod context;

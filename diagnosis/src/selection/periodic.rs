@@ -1,4 +1,5 @@
-//! Periodic effects: which orders of a turn, or which period along the travel, stand out of the residual.
+//! Periodic effects: which orders of a turn, or which period along the travel, stand out of the
+//! residual.
 
 use crate::effects::definition::Span;
 use crate::effects::{Effect, EffectName as N};
@@ -24,11 +25,12 @@ const MOST: usize = 14;
 const MOST_CYCLES: f64 = 480.0;
 /// Fewest half cycles over the travel where no turn is known: less is a shape along the travel.
 const FEWEST: usize = 6;
-/// Gain of log-likelihood that a further order must bring, beside one for the orders looked through.
+/// Gain of log-likelihood that a further order must bring, beside one for the orders looked
+/// through.
 const PER_ORDER: f64 = 8.0;
 
-/// Periods that the travel must hold for an order to be told from a shape along the travel, and the part of a turn that shows a mass off
-/// its centre, whose order is known.
+/// Periods that the travel must hold for an order to be distinguished from a shape along the
+/// travel, and the part of a turn that shows a mass off its centre, whose order is known.
 const PERIODS: f64 = 2.0;
 const MOST_OF_TURN: f64 = 0.6;
 
@@ -42,7 +44,8 @@ pub(crate) fn are_apart(a: f64, b: f64, turns: f64) -> bool {
     (a - b).abs() * turns >= 1.0
 }
 
-/// Spatial frequencies worth trying: whole orders of a turn where it is known, otherwise a grid of cycles over the travel.
+/// Spatial frequencies worth trying: whole orders of a turn where it is known, otherwise a grid of
+/// cycles over the travel.
 fn candidates(span: &Span, nominal: &Nominal) -> Option<(f64, Vec<f64>)> {
     let travel = span.travel();
     // A wave must be resolved by the encoder and stay in the band of the filter at slow speed.
@@ -93,7 +96,8 @@ pub(crate) struct Searched<'a> {
     pub(crate) model: &'a Model,
 }
 
-/// Waves along the travel: orders of a turn where it is known, otherwise cycles over the travel, with their responses.
+/// Waves along the travel: orders of a turn where it is known, otherwise cycles over the travel,
+/// with their responses.
 struct Waves<'a> {
     context: &'a FitContext<'a>,
     searched: &'a Searched<'a>,
@@ -136,7 +140,8 @@ impl<'a> Waves<'a> {
         gain_of(&self.project(&self.terms(order)))
     }
 
-    /// The orders that gain most by themselves, apart from each other, each moved to where it gains most; `single` has the gain of each.
+    /// The orders that gain most by themselves, apart from each other, each moved to where it gains
+    /// most; `single` has the gain of each.
     fn best_alone(&self, single: &[f64]) -> Vec<f64> {
         let orders = &self.orders;
         let mut ranked: Vec<usize> = (0..orders.len()).collect();
@@ -176,7 +181,8 @@ impl<'a> Waves<'a> {
         (chosen.iter().map(|i| orders[*i]).collect(), gain)
     }
 
-    /// The effect that is made of the orders that gain most, with their gain; `single` has the gain of each order alone.
+    /// The effect that is made of the orders that gain most, with their gain; `single` has the gain
+    /// of each order alone.
     fn found(&self, name: N, single: &[f64]) -> Option<(Effect, f64)> {
         // Only the best by themselves are fitted together.
         let alone = self.best_alone(single);
@@ -187,37 +193,23 @@ impl<'a> Waves<'a> {
         if orders.is_empty() || (self.whole && !name.definition().is_of_orders(&orders)) {
             return None;
         }
-        let shape = self.shape(&orders);
-        let shape: Vec<(&str, f64)> = shape.iter().map(|(key, value)| (key.as_str(), *value)).collect();
-        Some((Effect::shaped(name, &shape), gain))
+        Some((self.made_of(name, &orders), gain))
     }
 
-    /// The shape of an effect that is made of some orders.
-    fn shape(&self, orders: &[f64]) -> Vec<(String, f64)> {
+    /// An effect that is made of some orders.
+    fn made_of(&self, name: N, orders: &[f64]) -> Effect {
         if self.whole {
-            return shape_of_orders(self.turn, orders);
+            return Effect::of_orders(name, self.turn, orders);
         }
         let mut periods: Vec<f64> = orders.iter().map(|order| self.turn / order).collect();
         periods.sort_by(f64::total_cmp);
-        periods.into_iter().enumerate().map(|(i, period)| (format!("period_{}", i + 1), period)).collect()
+        Effect::of_periods(name, &periods)
     }
 }
 
-/// The shape of an effect that is made of whole orders of a turn, rad or m.
-fn shape_of_orders(turn: f64, orders: &[f64]) -> Vec<(String, f64)> {
-    let waves = orders.iter().map(|order| (format!("order_{order}"), *order));
-    std::iter::once(("turn".to_owned(), turn)).chain(waves).collect()
-}
-
-/// An effect that is made of whole orders of a turn, rad or m.
-pub(crate) fn of_orders(name: N, turn: f64, orders: &[f64]) -> Effect {
-    let shape = shape_of_orders(turn, orders);
-    let shape: Vec<(&str, f64)> = shape.iter().map(|(key, value)| (key.as_str(), *value)).collect();
-    Effect::shaped(name, &shape)
-}
-
-/// Whitened responses of each recording to cosine and sine of some waves, for one search after another; `means` holds those waves for
-/// each recording. All searches are of the same recordings. A walk over a recording takes little longer for four inputs than for one.
+/// Whitened responses of each recording to cosine and sine of some waves, for one search after
+/// another; `means` holds those waves for each recording. All searches are of the same recordings.
+/// A walk over a recording takes little longer for four inputs than for one.
 fn terms_of(searches: &[&Waves], means: &[Vec<Means>]) -> Vec<Terms> {
     let Some(first) = searches.first() else { return Vec::new() };
     let count: usize = means.first().map_or(0, Vec::len);
@@ -265,8 +257,9 @@ fn gains_on_ladder(searches: &[&Waves], orders: &[f64]) -> Vec<Vec<f64>> {
     terms.chunks(orders.len()).map(|of| of.iter().map(|one| gain_of(&first.project(one))).collect()).collect()
 }
 
-/// Finds the orders of cogging or torque ripple, each effect for itself, in the residual of a fit; the gain counts every recording's own
-/// phases. Effects without any order that stands out are left out.
+/// Finds the orders of cogging or torque ripple, each effect for itself, in the residual of a fit;
+/// the gain counts every recording's own phases. Effects without any order that stands out are left
+/// out.
 pub(crate) fn search(names: &[N], context: &FitContext, searched: &Searched) -> Vec<(Effect, f64)> {
     let waves: Vec<(N, Waves)> =
         names.iter().filter_map(|name| Some((*name, Waves::new(*name, context, searched)?))).collect();
@@ -282,7 +275,8 @@ fn gain_of(sums: &Sums) -> f64 {
     if gain.is_finite() { gain } else { 0.0 }
 }
 
-/// Picks orders one after another while each brings more than it costs; `may_join` says which may stand beside those chosen.
+/// Picks orders one after another while each brings more than it costs; `may_join` says which may
+/// stand beside those chosen.
 fn forward(
     sums: &Sums,
     orders: usize,
@@ -336,9 +330,9 @@ const MULTIPLE: f64 = 0.1;
 /// Part of the strongest amplitude that an order must have to count in a run.
 const STANDS: f64 = 0.2;
 
-/// True if the waves found are those of teeth or poles. A well or a bump at one place needs all orders up to its width, one
-/// after the other, and repeats only because so little of the travel is seen. Orders count from the turn where it is known,
-/// otherwise from the longest wave.
+/// True if the waves found are those of teeth or poles. A well or a bump at one place needs all
+/// orders up to its width, one after the other, and repeats only because so little of the travel is
+/// seen. Orders count from the turn where it is known, otherwise from the longest wave.
 pub(crate) fn is_comb(effect: &Effect, amplitudes: &[f64]) -> bool {
     if !effect.name.definition().is_periodic() {
         return true;

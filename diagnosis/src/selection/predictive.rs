@@ -1,14 +1,17 @@
-//! The prediction of blocks of the fitted recordings that were left out of the fit (K-fold cross-validation).
+//! The prediction of blocks of the fitted recordings that were left out of the fit (K-fold
+//! cross-validation).
 //!
-//! Noise and shapes stay as they were fitted to all blocks; every coefficient, each recording's offset and phases among them, is fitted
-//! anew without the blocks that it is judged on. A model with more freedom pays for it here by itself.
+//! Noise and shapes stay as they were fitted to all blocks; every coefficient, each recording's
+//! offset and phases among them, is fitted anew without the blocks that it is judged on. A model
+//! with more freedom pays for it here by itself.
 
 use crate::estimation::fit::{Fit, normal_of};
 use crate::numerics::linear::{Prior, bounded};
 
 /// Parts that segments are dealt into.
 pub(crate) const FOLDS: usize = 6;
-/// Neighbouring segments that are left out together: what a disturbance remembers must not tell of the block that is judged.
+/// Neighbouring segments that are left out together: what a disturbance remembers must not tell of
+/// the block that is judged.
 const TOGETHER: usize = 3;
 
 /// The fold in which a segment of a recording is left out.
@@ -32,7 +35,8 @@ fn left_out_solutions(fit: &Fit) -> impl Iterator<Item = Vec<f64>> + '_ {
     })
 }
 
-/// Cost of each segment of each recording, in log-likelihood, predicted by a fit to the other folds.
+/// Cost of each segment of each recording, in log-likelihood, predicted by a fit to the other
+/// folds.
 pub(crate) fn left_out_costs(fit: &Fit) -> Vec<f64> {
     let mut costs: Vec<Vec<f64>> = fit.prepared.iter().map(|one| vec![0.0; one.segments.len()]).collect();
     for (fold, x) in left_out_solutions(fit).enumerate() {
@@ -47,7 +51,8 @@ pub(crate) fn left_out_costs(fit: &Fit) -> Vec<f64> {
     costs.concat()
 }
 
-/// Whitened residuals of all blocks, each predicted by a fit to the other folds and none weighed down.
+/// Whitened residuals of all blocks, each predicted by a fit to the other folds and none weighed
+/// down.
 pub(crate) fn left_out_residuals(fit: &Fit) -> Vec<f64> {
     let mut out = Vec::new();
     for (fold, x) in left_out_solutions(fit).enumerate() {
@@ -61,18 +66,21 @@ pub(crate) fn left_out_residuals(fit: &Fit) -> Vec<f64> {
     out
 }
 
-/// Degrees of freedom of the noise of a block: moments that nothing here models (a stop, an impact) are far off, not impossible.
+/// Degrees of freedom of the noise of a block: moments that nothing here models (a stop, an impact)
+/// are far off, not impossible.
 const DEGREES: f64 = 4.0;
 /// Rounds in which the scale of that noise is found.
 const ROUNDS: usize = 25;
 /// Blocks that share a disturbance: the longest that the noise of the filter remembers, 0.1 s.
 const REMEMBERED: usize = 40;
 
-/// Gain of log-likelihood over standard errors, of whitened residuals `with` over those `without`, block by block, under Student's t
-/// with the scale likeliest for `with`; `paid` is what the gain costs besides, nats.
+/// Gain of log-likelihood over standard errors, of whitened residuals `with` over those `without`,
+/// block by block, under Student's t with the scale likeliest for `with`; `paid` is what the gain
+/// costs besides, nats.
 ///
-/// The error is that of the score, by stretches as long as a disturbance (Newey and West, Econometrica 55, 1987): noise that a
-/// difference between the models meets makes it unsure, and that the difference is large in few blocks does not.
+/// The error is that of the score, by stretches as long as a disturbance (Newey and West,
+/// Econometrica 55, 1987): noise that a difference between the models meets makes it unsure, and
+/// that the difference is large in few blocks does not.
 pub(crate) fn score_z(with: &[f64], without: &[f64], paid: f64) -> f64 {
     let square = t_square(with);
     let cost = |e: f64| 0.5 * (DEGREES + 1.0) * (e * e / square / DEGREES).ln_1p();
@@ -108,7 +116,8 @@ mod tests {
     use crate::io::recording::Recording;
     use crate::io::rig::Rig;
 
-    /// Gain of an effect on left-out blocks of a recording of nothing but noise and, where asked, drag.
+    /// Gain of an effect on left-out blocks of a recording of nothing but noise and, where asked,
+    /// drag.
     fn gain(drag: f64) -> f64 {
         let rig = Rig::of_values(0.01, 0.0, 0.0);
         let (h, rows) = (1e-3, 12_000);
@@ -155,7 +164,7 @@ mod tests {
         // Ten times the noise in three stretches of ten blocks.
         let rare = |j: usize| if j % 2000 < 10 { 10.0 } else { 0.0 };
         assert!(score_z(&quiet, &plus(&rare), 0.0) > 6.0);
-        // Half of what is there, in the same blocks: what is left is no noise.
+        // Half of what is there, in the same blocks: the residual is not noise.
         assert!(score_z(&plus(&|j| 0.5 * rare(j)), &plus(&rare), 0.0) < 3.0);
         // A difference that has nothing to do with what is there.
         assert!(score_z(&plus(&|j| 0.2 * (j as f64).sin()), &quiet, 0.0) < 0.0);

@@ -1,4 +1,5 @@
-//! The score test of an effect: how much likelihood its terms would add, with everything already in the model projected out.
+//! The score test of an effect: how much likelihood its terms would add, with everything already in
+//! the model projected out.
 
 use crate::effects::Effect;
 use crate::estimation::blocked_recording::BlockedRecording;
@@ -23,8 +24,8 @@ pub(crate) struct Score {
 /// Whitened responses of an effect's terms over each recording: `[recording][term][block]`.
 pub(crate) type Terms = Vec<Vec<Vec<f64>>>;
 
-/// Inputs that an effect would add to a model over one recording; `after` is the effective command with it, where it acts
-/// on the command.
+/// Inputs that an effect would add to a model over one recording; `after` is the effective command
+/// with it, where it acts on the command.
 fn added_inputs(
     model: &Model,
     track: &BlockedRecording,
@@ -40,7 +41,8 @@ fn added_inputs(
     effect_inputs(track, effect, command, track.bias, || track.drive(before.as_deref()))
 }
 
-/// Sums that a score test needs: information of the terms with the model projected out, and their score.
+/// Sums that a score test needs: information of the terms with the model projected out, and their
+/// score.
 pub(crate) struct Sums {
     pub(crate) information: Square,
     pub(crate) score: Vec<f64>,
@@ -77,7 +79,7 @@ pub(crate) fn project(fit: &Fit, residuals: &[Vec<f64>], terms: &Terms, own: boo
         for j in 0..size {
             let x: f64 = (0..base).map(|b| row[b] * cross[j * base + b]).sum();
             let before = information.at(i, j);
-            // What is left after projection must be more than rounding.
+            // The rest after projection must be more than rounding.
             let left = before - x;
             information.a[i * size + j] = if i == j && left < 1e-7 * before { 0.0 } else { left };
         }
@@ -137,8 +139,8 @@ pub(crate) fn best_on_grid(
 ) -> Option<(Effect, Score)> {
     let scores = parallel::map_all(grid, |effect| score(fit, residuals, model, tracks, effect, nominal));
     // Of profiles along the travel the finer has more values to fit.
-    let degree = |effect: &Effect| effect.shape.get("degree").copied().unwrap_or(0.0);
-    let net = |effect: &Effect, score: &Score| score.gain - PER_COEFFICIENT * degree(effect);
+    let values = |effect: &Effect| effect.name.definition().profile_values(effect);
+    let net = |effect: &Effect, score: &Score| score.gain - PER_COEFFICIENT * values(effect);
     let mut best: Option<(Effect, Score)> = None;
     for (effect, score) in grid.iter().zip(scores) {
         if score.gain > 0.0 && best.as_ref().is_none_or(|(e, b)| net(effect, &score) > net(e, b)) {

@@ -1,4 +1,5 @@
-//! Naming: forward selection of effects, backward pruning, and the swap of each effect against its rivals.
+//! Naming: forward selection of effects, backward pruning, and the swap of each effect against its
+//! rivals.
 
 use crate::effects::definition::NominalTerm;
 use crate::effects::{Effect, EffectName as N};
@@ -27,7 +28,8 @@ const MOVED_AGAIN: usize = 2;
 const FARTHER: usize = 4;
 /// The number of searches for waves under the noise that they leave.
 const SEARCHES: usize = 3;
-/// The largest value along one value of a shape between two ends, in its logarithm, and the effect that has it.
+/// The largest value along one value of a shape between two ends, in its logarithm, and the effect
+/// that has it.
 fn along(
     effect: &Effect,
     key: &str,
@@ -68,7 +70,8 @@ impl FitContext<'_> {
         N::ALL.iter().chain(&self.nominal.rig.searched).copied().filter(is_tried).collect()
     }
 
-    /// The best shape of every effect that is not in the model yet, with the gain of its score test, best first.
+    /// The best shape of every effect that is not in the model yet, with the gain of its score
+    /// test, best first.
     pub(crate) fn screen(
         &self,
         now: &FittedModel,
@@ -112,7 +115,7 @@ impl FitContext<'_> {
         let movable = candidates::movable(&effect, self.span);
         let mut best = gain(&effect);
         for round in 0..2 {
-            // What matters most stands first; the rest is moved where it is fitted.
+            // What matters most comes first; the rest is moved where it is fitted.
             for (key, low, high) in movable.iter().take(if round == 0 { MOVED } else { MOVED_AGAIN }) {
                 let at = effect.shape[*key];
                 let reach = if round == 0 { 2.2_f64 } else { 1.3 };
@@ -151,8 +154,8 @@ impl FitContext<'_> {
         candidates.sort_by(|a, b| b.merit.total_cmp(&a.merit));
     }
 
-    /// Looks for waves again under the noise that those found first have left: weak ones hide in the noise of a null that
-    /// knows of none.
+    /// Looks for waves again under the noise that those found first have left: weak ones hide in
+    /// the noise of a null that knows of none.
     fn search_waves_again(&self, candidate: &FittedModel) -> FittedModel {
         let again = |from: &FittedModel| {
             let mut model = from.model.clone();
@@ -182,7 +185,8 @@ impl FitContext<'_> {
         let merit = |model: &Model| self.merit_of(model, &candidate.noise);
         let mut best = candidate.fit.log_likelihood;
         let movable = candidates::movable(&candidate.model.effects[last], self.span);
-        // The score test holds the gain and looks near by: delays, drifts and events have optima that lie apart.
+        // The score test holds the gain and looks near by: delays, drifts and events have optima
+        // that lie apart.
         if let (true, Some((key, low, high))) =
             (candidate.model.effects[last].name.definition().has_optima_apart(), movable.first().copied())
         {

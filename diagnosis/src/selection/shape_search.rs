@@ -1,4 +1,5 @@
-//! Moves all values of a shape together: Gauss–Newton on whitened innovations, with the coefficients projected out.
+//! Moves all values of a shape together: Gauss–Newton on whitened innovations, with the
+//! coefficients projected out.
 
 use crate::estimation::filter::Noise;
 use crate::estimation::fit::Fit;
@@ -20,8 +21,8 @@ const PARTS: [f64; 3] = [1.0, 0.4, 0.15];
 /// Gain of log-likelihood below which it is not worth going on.
 const ENOUGH: f64 = 0.5;
 
-/// The model with the shape of its last effect where `merit` is larger than `best`, as far as steps downhill lead, and what
-/// it is worth there.
+/// The model with the shape of its last effect where `merit` is larger than `best`, as far as steps
+/// downhill lead, and what it is worth there.
 pub(crate) fn descend(
     context: &FitContext,
     mut model: Model,

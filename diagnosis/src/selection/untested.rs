@@ -1,4 +1,5 @@
-//! The effects that recordings could not show, with the reason: what was not tested is not ruled out.
+//! The effects that recordings could not show, with the reason: what was not tested is not ruled
+//! out.
 
 use crate::effects::EffectName;
 use crate::effects::definition::Span;

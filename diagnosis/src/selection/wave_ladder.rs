@@ -1,5 +1,6 @@
-//! Mean cosine and sine over each block of waves whose numbers are evenly spaced: a wave follows from the one before it by the addition
-//! of angles, in a fifth of the time that its own sine and cosine take.
+//! Mean cosine and sine over each block of waves whose numbers are evenly spaced: a wave follows
+//! from the one before it by the addition of angles, in a fifth of the time that its own sine and
+//! cosine take.
 
 use crate::effects::{sinc, wave_mean};
 use crate::estimation::blocked_recording::BlockedRecording;
@@ -50,7 +51,8 @@ impl Block {
     }
 }
 
-/// The place about which a block lies and the travel passed within it, rad or m; none is passed at rest.
+/// The middle of a block's travel and the travel passed within it, rad or m; none is passed at
+/// rest.
 pub(crate) fn places(track: &BlockedRecording) -> Vec<(f64, f64)> {
     let passed = |j: usize| match track.motion.rest[j] {
         true => 0.0,

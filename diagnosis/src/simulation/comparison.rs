@@ -14,8 +14,8 @@ pub struct Simulated {
     pub model: String,
     /// From the first row under the recorded command.
     pub free: Trajectory,
-    /// Position at every row, started from the measured state every `AFRESH_S`, rad or m; none where the recording is shorter
-    /// than two of these.
+    /// Position at every row, started from the measured state every `AFRESH_S`, rad or m; none
+    /// where the recording is shorter than two of these.
     pub afresh: Option<Vec<f64>>,
     /// Under the recorded reference, where there is one and the loop was recognised.
     pub under: Option<Trajectory>,
@@ -124,8 +124,8 @@ impl Comparison {
         self.models.iter().find(|m| m.model == model).map(|m| &m.figures)
     }
 
-    /// A sentence where the model that leaves the least force, the patched one or else the refit, is off by more in its trajectory
-    /// than one before it; none where it is not.
+    /// A sentence where the model that leaves the least force, the patched one or else the refit,
+    /// is off by more in its trajectory than one before it; none where it is not.
     pub fn worse_for_less_force(&self) -> Option<String> {
         if self.figures("patched").is_some() {
             self.worse("patched", "refit").or_else(|| self.worse("patched", "nominal"))
@@ -134,7 +134,8 @@ impl Comparison {
         }
     }
 
-    /// A sentence where a model is off by more in its trajectory than another, in the free run or in windows; none where not.
+    /// A sentence where a model is off by more in its trajectory than another, in the free run or
+    /// in windows; none where not.
     pub fn worse(&self, model: &str, than: &str) -> Option<String> {
         let (a, b) = (self.figures(model)?, self.figures(than)?);
         let unit = self.kind.length();

@@ -1,5 +1,5 @@
-//! The position loop that ran while a recording was made, told from its reference: what it takes to simulate under that
-//! reference rather than under the recorded command.
+//! The position loop that ran while a recording was made, found from its reference: what it takes
+//! to simulate under that reference rather than under the recorded command.
 
 use super::Motion;
 use crate::io::recording::Recording;
@@ -20,8 +20,8 @@ pub struct PositionLoop {
 }
 
 impl PositionLoop {
-    /// The loop that explains a command by its reference; none where there is no reference or no such loop.
-    /// `gain` is the drive's, for the sign.
+    /// The loop that explains a command by its reference; none where there is no reference or no
+    /// such loop. `gain` is the drive's, for the sign.
     pub fn fit(recording: &Recording, motion: &Motion, gain: f64) -> Option<Self> {
         let reference = motion.reference.as_ref()?;
         let columns: Vec<[f64; 3]> = reference

@@ -68,7 +68,8 @@ impl Motion {
     }
 }
 
-/// Slope at every row of the parabola that fits the rows within half of [`SPAN_S`] on either side best.
+/// Slope at every row of the parabola that fits the rows within half of [`SPAN_S`] on either side
+/// best.
 fn slopes(time: &[f64], position: &[f64]) -> Vec<f64> {
     let n = time.len();
     let (mut from, mut to) = (0, 0);

@@ -65,7 +65,8 @@ impl Plant {
         let (free, dry) = self.forces(effective, around, dt);
         let before = self.velocity;
         self.velocity = self.velocity_after(free, dry.max(0.0), dt);
-        // The mean speed of the step: with the last one the reading would be half a step early, which shows without noise.
+        // The mean speed of the step: with the last one the reading would be half a step early,
+        // which shows without noise.
         let mean = 0.5 * (before + self.velocity);
         self.position += mean * dt;
         if let Some(filter) = self.filter_s() {
@@ -79,7 +80,8 @@ impl Plant {
     fn forces(&mut self, effective: f64, around: Surroundings, dt: f64) -> (f64, f64) {
         let drive = self.rig.actuator.gain * effective;
         let model = &self.rig.model;
-        // While stuck the laws see the direction in which the drive pushes, so that breakaway is against friction.
+        // While stuck the laws see the direction in which the drive pushes, so that breakaway is
+        // against friction.
         let push = drive + around.external;
         let velocity = if self.velocity == 0.0 { push.signum() * f64::MIN_POSITIVE } else { self.velocity };
         let state = State {
@@ -119,7 +121,8 @@ impl Plant {
         (free, dry)
     }
 
-    /// The velocity after a step. Dry friction stops the axis; it never turns it round within a step.
+    /// The velocity after a step. Dry friction stops the axis; it never turns it round within a
+    /// step.
     fn velocity_after(&self, free: f64, dry: f64, dt: f64) -> f64 {
         let inertia = self.rig.model.inertia;
         if self.velocity == 0.0 {
@@ -148,7 +151,8 @@ impl Plant {
         self.velocity
     }
 
-    /// Returns the reading of a sensor without steps: the position behind the filter that the rig knows, plus its sensor effects.
+    /// Returns the reading of a sensor without steps: the position behind the filter that the rig
+    /// knows, plus its sensor effects.
     pub fn reading(&self) -> f64 {
         self.position - self.lag + self.sensor
     }
@@ -162,7 +166,8 @@ impl Plant {
         self.time = time;
     }
 
-    /// Sets position and velocity, for replay from a measured state: behind a known filter of the sensor the position is further on.
+    /// Sets position and velocity, for replay from a measured state: behind a known filter of the
+    /// sensor the position is further on.
     pub fn place(&mut self, position: f64, velocity: f64) {
         self.lag = velocity * self.filter_s().unwrap_or(0.0);
         self.position = position + self.lag;

@@ -1,5 +1,5 @@
-//! A rig beside a recording: free run from the first row, windows started from the measured state, and under the recorded
-//! reference. The command is held from row to row, as the contract has it.
+//! A rig beside a recording: free run from the first row, windows started from the measured state,
+//! and under the recorded reference. The command is held from row to row, as the contract has it.
 
 use super::{Motion, Plant, PositionLoop, Surroundings};
 use crate::io::recording::Recording;
@@ -7,7 +7,8 @@ use crate::io::rig::Rig;
 
 /// Longest step of the plant, s.
 const STEP_S: f64 = 1e-4;
-/// Time before a window in which the plant is led along the measured motion, so that delays, lags and bristles are under way.
+/// Time before a window in which the plant is led along the measured motion, so that delays, lags
+/// and bristles are under way.
 const LEAD_S: f64 = 0.15;
 /// Most seconds of windows of one length.
 const MOST_S: f64 = 12.0;
@@ -62,12 +63,14 @@ pub struct Beside<'a> {
     pub recording: &'a Recording,
     /// Its motion.
     pub motion: Motion,
-    /// The first row's place on the mechanism, rad or m: only terms that depend on the travel use it.
+    /// The first row's place on the mechanism, rad or m: only terms that depend on the travel use
+    /// it.
     pub start: f64,
 }
 
 impl<'a> Beside<'a> {
-    /// A recording under a rig; the start is where absolute counts say, else where the rig's periodic effects fit the recording best.
+    /// A recording under a rig; the start is where absolute counts say, else where the rig's
+    /// periodic effects fit the recording best.
     pub fn new(recording: &'a Recording, rig: &Rig) -> Self {
         Self::in_motion(recording, Motion::new(recording, rig), rig)
     }
@@ -155,7 +158,8 @@ impl<'a> Beside<'a> {
         self.whole(rig, Some(feedback))
     }
 
-    /// Windows of `seconds`, each started from the measured state, one after the other or, in long recordings, spread over it.
+    /// Windows of `seconds`, each started from the measured state, one after the other or, in long
+    /// recordings, spread over it.
     pub fn windows(&self, rig: &Rig, seconds: f64) -> Deviation {
         self.spread(rig, seconds, MOST_S)
     }
@@ -188,9 +192,8 @@ impl<'a> Beside<'a> {
         Deviation::of(sum, rows)
     }
 
-    /// Returns the position errors at every `every`th row, in windows of `seconds` one after the other, or in one run where that
-    /// is
-    /// longer than the recording.
+    /// Returns the position errors at every `every`th row, in windows of `seconds` one after the
+    /// other, or in one run where that is longer than the recording.
     pub(super) fn off(&self, rig: &Rig, seconds: f64, every: usize) -> Vec<f64> {
         let time = &self.motion.time;
         let (mut from, mut out) = (0, Vec::new());
@@ -210,14 +213,16 @@ impl<'a> Beside<'a> {
         out
     }
 
-    /// Position at every row in windows of `seconds` one after the other, each started from the measured state.
+    /// Position at every row in windows of `seconds` one after the other, each started from the
+    /// measured state.
     pub(super) fn started_every(&self, rig: &Rig, seconds: f64) -> Vec<f64> {
         let off = self.off(rig, seconds, 1);
         // A last row alone is no window.
         self.motion.position.iter().enumerate().map(|(i, q)| q + off.get(i).unwrap_or(&0.0)).collect()
     }
 
-    /// Inertia times the acceleration that a rig asks for along the recorded motion, N·m or N, as smooth as the speeds are.
+    /// Inertia times the acceleration that a rig asks for along the recorded motion, N·m or N, as
+    /// smooth as the speeds are.
     pub fn force(&self, rig: &Rig) -> Vec<f64> {
         let time = &self.motion.time;
         let mut plant = Plant::new(rig);

@@ -1,6 +1,7 @@
-//! Values of a rig fitted by what its free run is off, rather than by force: Levenberg–Marquardt on the position, first in
-//! windows that a wrong value cannot leave, then over the whole. What is fitted here predicts trajectories; what it says of
-//! physics is weaker, because errors of position add up.
+//! Values of a rig fitted by what its free run is off, rather than by force: Levenberg–Marquardt on
+//! the position, first in windows that a wrong value cannot leave, then over the whole. What is
+//! fitted here predicts trajectories; what it says of physics is weaker, because errors of position
+//! add up.
 
 use super::replay::Beside;
 use crate::io::recording::Recording;
@@ -49,7 +50,7 @@ fn set(rig: &mut Rig, value: &Value, x: f64) {
     }
 }
 
-/// The values that move: the drive's gain stands, because only ratios to it show.
+/// The values that move: the drive's gain is fixed, because only ratios to it show.
 fn values(rig: &Rig) -> Vec<Value> {
     let mut out = vec![Value::Inertia];
     out.extend(rig.model.viscous.map(|_| Value::Viscous));
@@ -69,11 +70,12 @@ fn residuals(rig: &Rig, besides: &[Beside], seconds: f64) -> Vec<f64> {
     besides.iter().flat_map(of).collect()
 }
 
-/// Lengths of the windows of one stage after the other, s: a wrong value leads a long run so far astray that nothing near is
-/// better.
+/// Lengths of the windows of one stage after the other, s: a wrong value leads a long run so far
+/// astray that nothing near is better.
 const STAGES_S: [f64; 3] = [1.0, 5.0, f64::INFINITY];
 
-/// The rig whose free run is off least on `recordings`, from where `rig` stands; its structure is kept.
+/// The rig whose free run is off least on `recordings`, beginning with `rig`; its structure is
+/// kept.
 pub fn fit(rig: &Rig, recordings: &[Recording]) -> Rig {
     let besides: Vec<Beside> = recordings.iter().map(|r| Beside::new(r, rig)).collect();
     let force = rig.actuator.gain.abs()
@@ -84,7 +86,7 @@ pub fn fit(rig: &Rig, recordings: &[Recording]) -> Rig {
 /// One stage: windows of `seconds`. `force` is the largest that the drive was asked for.
 fn stage(rig: &Rig, besides: &[Beside], force: f64, seconds: f64) -> Rig {
     let moved = values(rig);
-    // A value's natural size: its own, or that of the force it stands beside.
+    // A value's natural size: its own, or that of the force next to it.
     let scale: Vec<f64> = moved
         .iter()
         .map(|value| {
@@ -105,7 +107,8 @@ fn stage(rig: &Rig, besides: &[Beside], force: f64, seconds: f64) -> Rig {
     at(&least_squares((start, at_start), &off, &usable))
 }
 
-/// Half the Hessian of the sum of squares and half its negative gradient, from derivatives by differences.
+/// Half the Hessian of the sum of squares and half its negative gradient, from derivatives by
+/// differences.
 fn normal_equations(
     theta: &[f64],
     at_theta: &[f64],
@@ -128,8 +131,9 @@ fn normal_equations(
     (information, score)
 }
 
-/// Minimises the sum of squares of residuals by Levenberg–Marquardt, from values with their residuals; `off` gives the residuals
-/// of other values, of which only those that are `usable` are taken.
+/// Minimises the sum of squares of residuals by Levenberg–Marquardt, from values with their
+/// residuals; `off` gives the residuals of other values, of which only those that are `usable` are
+/// taken.
 fn least_squares(
     (mut theta, mut at_theta): (Vec<f64>, Vec<f64>),
     off: &(dyn Fn(&[f64]) -> Vec<f64> + Sync),

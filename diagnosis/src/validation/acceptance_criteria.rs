@@ -1,5 +1,5 @@
-//! The evidence for an effect on fitted and on held-out recordings, and the criteria that it must meet to be named. Nothing here
-//! fits or chooses between effects.
+//! The evidence for an effect on fitted and on held-out recordings, and the criteria that it must
+//! meet to be named. Nothing here fits or chooses between effects.
 
 use crate::effects::{Effect, EffectName};
 use crate::numerics::bootstrap::Gain;
@@ -21,12 +21,15 @@ pub(crate) struct EffectEvidence {
     pub(crate) holdout: Gain,
     /// The same on blocks of the fitted recordings that were left out of its fit.
     pub(crate) fit: Gain,
-    /// The reduction of the force residual on held-out recordings, over the square of the remaining one.
+    /// The reduction of the force residual on held-out recordings, over the square of the remaining
+    /// one.
     pub(crate) force: Gain,
-    /// Standard errors of its gain under heavy-tailed noise by block, on left-out blocks of the fitted or on held-out recordings,
-    /// whichever are fewer; zero where it may be named without it.
+    /// Standard errors of its gain under heavy-tailed noise by block, on left-out blocks of the
+    /// fitted or on held-out recordings, whichever are fewer; zero where it may be named without
+    /// it.
     pub(crate) score_z: f64,
-    /// Part of the refit's residual above the sensor's noise that it explains, on fitted or on held-out recordings.
+    /// Part of the refit's residual above the sensor's noise that it explains, on fitted or on
+    /// held-out recordings.
     pub(crate) share: f64,
     /// Part of the held-out force error, root mean square, that it takes off.
     pub(crate) off_force: f64,
@@ -34,27 +37,28 @@ pub(crate) struct EffectEvidence {
     pub(crate) at_bound: bool,
     /// True if its waves, if it has any, are those of teeth or poles.
     pub(crate) is_comb: bool,
-    /// Size that it would have on each recording that plays it, over the size that it has on all, fitted ones first; none
-    /// where no fitted or no held-out one does.
+    /// Size that it would have on each recording that plays it, over the size that it has on all,
+    /// fitted ones first; none where no fitted or no held-out one does.
     pub(crate) sizes: Vec<f64>,
     /// Its part in the force error, where that names it.
     pub(crate) material: Option<Material>,
 }
 
 impl EffectEvidence {
-    /// True if its score is sure, however few moments it acts in. Presliding models pass this test on null data, so they are
-    /// excluded.
+    /// True if its score is sure, however few moments it acts in. Presliding models pass this test
+    /// on null data, so they are excluded.
     fn predicts(&self) -> bool {
         !self.effect.name.definition().bends_at_reversals() && self.score_z >= SURE_Z
     }
 
-    /// True if its gain is certain on every stretch of the held-out recordings and on the fitted ones, however little it explains
-    /// compared with larger effects.
+    /// True if its gain is certain on every stretch of the held-out recordings and on the fitted
+    /// ones, however little it explains compared with larger effects.
     pub(crate) fn is_certain(&self) -> bool {
         self.steadiest_z() >= CERTAIN_Z
     }
 
-    /// Standard errors of its gain, over every stretch of the held-out recordings, or on the fitted ones, whichever are fewer.
+    /// Standard errors of its gain, over every stretch of the held-out recordings, or on the fitted
+    /// ones, whichever are fewer.
     fn steadiest_z(&self) -> f64 {
         self.holdout.z.min(self.holdout.clipped_z).min(self.fit.z.max(self.fit.clipped_z))
     }
@@ -65,14 +69,16 @@ impl EffectEvidence {
         if self.predicts() { over_time.max(self.score_z) } else { over_time }
     }
 
-    /// True if its gain is sure on fitted and on held-out recordings, with or without a limit on what a stretch counts.
+    /// True if its gain is sure on fitted and on held-out recordings, with or without a limit on
+    /// what a stretch counts.
     fn stands_out(&self) -> bool {
         self.least_z() >= CERTAIN_Z
     }
 
-    /// True if it generalises to the held-out recordings: by likelihood, or, where it is most of what was left out, by the force
-    /// that it leaves and the same size as on the fitted ones. Next to reversals a law of slightly another form may be less
-    /// likely at many blocks and yet leave a third of the force.
+    /// True if it generalises to the held-out recordings: by likelihood, or, where it is most of
+    /// what was left out, by the force that it leaves and the same size as on the fitted ones. Next
+    /// to reversals a law of slightly another form may be less likely at many blocks and yet leave
+    /// a third of the force.
     fn generalises(&self) -> bool {
         let likely = self.holdout.low > 0.0
             && self.holdout.z.max(self.holdout.clipped_z) >= UNLIKELY_Z
@@ -86,13 +92,15 @@ impl EffectEvidence {
             || self.predicts()
     }
 
-    /// True if each of its moments is decided by itself: no bias that wanders looks like a reading that jumps.
+    /// True if each of its moments is decided by itself: no bias that wanders looks like a reading
+    /// that jumps.
     fn comes_in_events(&self) -> bool {
         self.effect.name.definition().is_of_jumps()
     }
 
-    /// True if it is nearly all that was left out and as large on every recording, or most of it and hardly differs between
-    /// them, and costs nothing in those moments of the held-out ones that do not play it, however few do.
+    /// True if it is nearly all that was left out and as large on every recording, or most of it
+    /// and hardly differs between them, and costs nothing in those moments of the held-out ones
+    /// that do not play it, however few do.
     fn agrees_everywhere(&self) -> bool {
         let harms_nowhere = |gain: &Gain| gain.sum > 0.0 && gain.low >= -HARMLESS * gain.sum;
         let is_nearly_all = self.share >= NEARLY_ALL_SHARE && self.is_same_size();
@@ -108,7 +116,8 @@ impl EffectEvidence {
         self.has_sizes_in(&SAME_SIZE)
     }
 
-    /// True if it takes most of what is left, surely, and as much of it everywhere: counts are lost now and then.
+    /// True if it takes most of the residual, surely, and as much of it everywhere: counts are lost
+    /// now and then.
     fn recurs(&self) -> bool {
         self.is_same_size() && self.share >= MOST_SHARE && self.holdout.low > 0.0 && self.force.low > 0.0
     }
@@ -122,13 +131,14 @@ impl EffectEvidence {
         self.force.sum >= HALF_OF_FORCE && self.share >= NEARLY_ALL_SHARE
     }
 
-    /// True if it leaves hardly anything and has the same size on every recording: its law is right, not only nearly right.
+    /// True if it leaves hardly anything and has the same size on every recording: its law is
+    /// right, not only nearly right.
     pub(crate) fn fits_everywhere(&self) -> bool {
         self.takes_all() && self.is_same_size()
     }
 
-    /// True if it may generalise together with another effect of the same size: sure on the fitted recordings, and not surely worse than
-    /// nothing on the others.
+    /// True if it may generalise together with another effect of the same size: sure on the fitted
+    /// recordings, and not surely worse than nothing on the others.
     pub(crate) fn is_provisional(&self) -> bool {
         self.fit.z >= PROMISING_Z && self.holdout.z > WORSE_Z && self.share >= SHARE
     }
@@ -163,14 +173,15 @@ impl EffectEvidence {
         })
     }
 
-    /// Returns why the simulation is right without an effect, however sure it is; none if it is not.
+    /// Returns why the simulation is right without an effect, however sure it is; none if it is
+    /// not.
     pub(crate) fn immaterial(&self) -> Option<Rejection> {
         let part = self.off_force;
         (part < MATERIAL).then_some(Rejection::Immaterial { part })
     }
 
-    /// Returns why an effect that shares of the force error name may not be named, `is_there` if its size is sure; none if it may.
-    /// Physics without a name was weighed by shares then.
+    /// Returns why an effect that shares of the force error name may not be named, `is_there` if
+    /// its size is sure; none if it may. Physics without a name was weighed by shares then.
     pub(crate) fn rejection_by_shares(&self, is_there: bool) -> Option<Rejection> {
         let beside_noise = self.material.as_ref().is_some_and(|material| material.beside_noise);
         if !is_there {
@@ -182,7 +193,8 @@ impl EffectEvidence {
         }
     }
 
-    /// Returns why an effect may not be named: the first requirement that it does not meet; none if it meets all.
+    /// Returns why an effect may not be named: the first requirement that it does not meet; none if
+    /// it meets all.
     pub(crate) fn rejection(&self) -> Option<Rejection> {
         if !self.generalises() {
             return Some(self.unsure());

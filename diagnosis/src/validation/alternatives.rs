@@ -1,4 +1,5 @@
-//! Rivals: every found effect is removed and others are fitted instead; those that fit nearly as well form its class.
+//! Rivals: every found effect is removed and others are fitted instead; those that fit nearly as
+//! well form its class.
 
 use crate::effects::definition::Shown;
 use crate::effects::{Effect, EffectName};
@@ -136,8 +137,8 @@ impl Contest<'_> {
     }
 }
 
-/// Returns the rival that leads by most, with the place of the effect that it leads; none where no effect is led. Effects that
-/// shares of the force error name met their rivals there.
+/// Returns the rival that leads by most, with the place of the effect that it leads; none where no
+/// effect is led. Effects that shares of the force error name met their rivals there.
 pub(crate) fn leader(found: &[EffectEvidence]) -> Option<(usize, Effect)> {
     let leads = |rival: &&Rival| rival.z < -LEADS_Z && rival.absence.is_none();
     let by_likelihood = found.iter().enumerate().filter(|(_, one)| one.material.is_none());

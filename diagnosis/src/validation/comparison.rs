@@ -13,7 +13,8 @@ pub(crate) struct Shown {
     pub(crate) on_fit: Residuals,
     pub(crate) on_holdout: Residuals,
     pub(crate) table: FitTable,
-    /// True if the nominal values explain held-out recordings better than refitted ones, which then stand for them.
+    /// True if the nominal values explain held-out recordings better than refitted ones, which then
+    /// stand for them.
     pub(crate) keeps_nominal: bool,
 }
 
@@ -30,7 +31,8 @@ impl Shown {
         let known: &[BlockedRecording] = &known(holdout, &patched.model, context.span);
         let on_fit = residuals(nominal, estimator, context.tracks, false, refit, &patched);
         let on_holdout = residuals(nominal, estimator, known, true, refit, &patched);
-        // Values that a refit moved for the worse are not kept: the structure is wrong, or what the rig says of them.
+        // Values that a refit moved for the worse are not kept: the structure is wrong, or what the
+        // rig says of them.
         let (mut on_fit, mut on_holdout) = (on_fit, on_holdout);
         let keeps_nominal =
             estimator.rms(&on_holdout.refit, known) > estimator.rms(&on_holdout.nominal, known);

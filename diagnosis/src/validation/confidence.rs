@@ -1,7 +1,8 @@
-//! The confidence in a name: a logistic score of its evidence, calibrated on recordings whose truth is known.
+//! The confidence in a name: a logistic score of its evidence, calibrated on recordings whose truth
+//! is known.
 //!
-//! `prove --calibrate` finds such weights from the evidence that reports carry. The seeds that they come from may not
-//! judge.
+//! `prove --calibrate` finds such weights from the evidence that reports carry. The seeds that they
+//! come from may not judge.
 
 use crate::thresholds::{
     BIAS, CERTAIN_SHARE, CLAIMED, COUNTED_SHARE, LEFT_OF_FORCE, NAMED, SUREST_Z, UNLIKELY_Z, WEIGHTS,
@@ -19,9 +20,9 @@ pub(crate) type Evidence = BTreeMap<String, f64>;
 pub(crate) struct Leftover {
     /// Root mean square of what hangs together over time and is not explained, over the force's.
     pub(crate) of_force: f64,
-    /// Mean square that the patched model leaves over the refit's, both above what counting and a white disturbance make, on
-    /// fitted or on held-out recordings, whichever is less: what hangs together beside an effect is its wrong law, or another
-    /// effect.
+    /// Mean square that the patched model leaves over the refit's, both above what counting and a
+    /// white disturbance make, on fitted or on held-out recordings, whichever is less: what hangs
+    /// together beside an effect is its wrong law, or another effect.
     pub(crate) unexplained: f64,
 }
 
@@ -30,7 +31,7 @@ pub(crate) fn evidence(found: &EffectEvidence, left: Leftover) -> Evidence {
     let log = |x: f64, low: f64, high: f64| x.max(low).min(high).ln();
     let least_share = if found.is_certain() { CERTAIN_SHARE } else { COUNTED_SHARE };
     let unexplained = left.unexplained.min(1.0 - found.share).max(0.0);
-    // What is left and is hardly more than nothing beside the force says little.
+    // A residual that is hardly more than nothing, compared with the force, says little.
     let of_force = log(left.of_force / LEFT_OF_FORCE.0, 1.0, LEFT_OF_FORCE.1 / LEFT_OF_FORCE.0);
     let share = log(found.share, least_share, 1.0);
     let bends = found.effect.name.definition().bends_at_reversals();
@@ -46,8 +47,8 @@ pub(crate) fn evidence(found: &EffectEvidence, left: Leftover) -> Evidence {
     .into()
 }
 
-/// Returns how much each piece of evidence lowers the score, relative to an effect that is certain, explains everything and
-/// leaves nothing.
+/// Returns how much each piece of evidence lowers the score, relative to an effect that is certain,
+/// explains everything and leaves nothing.
 fn takes(evidence: &Evidence) -> impl Iterator<Item = (&'static str, f64)> {
     let best = |key: &str| if key == "least_z" { SUREST_Z.ln() } else { 0.0 };
     WEIGHTS.iter().map(move |(key, weight)| (*key, weight * (best(key) - evidence[*key])))
@@ -59,8 +60,8 @@ pub(crate) fn confidence(evidence: &Evidence) -> f64 {
     (1.0 / (1.0 + (-(BIAS + score)).exp())).clamp(CLAIMED.0, CLAIMED.1)
 }
 
-/// The probability of a name whose simulation follows the motion less well in short windows than the simulation without it. It may
-/// become unsure by that, and is not taken back.
+/// The probability of a name whose simulation follows the motion less well in short windows than
+/// the simulation without it. It may become unsure by that, and is not taken back.
 pub(crate) fn with_worse_motion(confidence: f64) -> f64 {
     let odds = confidence / (1.0 - confidence) * (-WORSE_MOTION.0).exp();
     (odds / (1.0 + odds)).max(confidence.min(NAMED))

@@ -1,5 +1,5 @@
-//! The confidence of each effect found. Effects that are too unsure are removed and the rest is weighed again: a false effect
-//! takes evidence from a true one.
+//! The confidence of each effect found. Effects that are too unsure are removed and the rest is
+//! weighed again: a false effect takes evidence from a true one.
 
 use crate::effects::definition::Definition;
 use crate::effects::{Effect, EffectName};
@@ -77,7 +77,8 @@ pub(crate) struct WeighedModel {
     /// Frequency at which a force may swing whatever the axis does, and that force if it does.
     hertz: Option<f64>,
     pub(crate) swing: Option<TonalDisturbance>,
-    /// Correlation of what is left between repeats of a motion, where there are any and it is surely more than chance.
+    /// Correlation of the residual between repeats of a motion, where there are any and it is
+    /// surely more than chance.
     pub(crate) repeats: Option<f64>,
 }
 
@@ -113,7 +114,8 @@ impl WeighedModel {
         self.swing.is_some_and(|swing| swing.is_mistaken())
     }
 
-    /// The effect that explains most, with what it would rather be, where something without a name explains more.
+    /// The effect that explains most, with what it would rather be, where something without a name
+    /// explains more.
     pub(crate) fn resembled(&self) -> Option<(EffectName, Rather)> {
         let most = self.effects.iter().max_by(|a, b| a.found.holdout.sum.total_cmp(&b.found.holdout.sum))?;
         Some((most.found.effect.name, most.rather.clone()?))
@@ -126,7 +128,8 @@ impl WeighedModel {
         }
     }
 
-    /// Marks the least sure of the named effects as immaterial: with all of them a model takes only this part off the held-out force error.
+    /// Marks the least sure of the named effects as immaterial: with all of them a model takes only
+    /// this part off the held-out force error.
     pub(crate) fn weakest_is_immaterial(&mut self, part: f64) {
         let sure = |i: &usize| self.effects[*i].confidence;
         let weakest = self.named().into_iter().min_by(|a, b| sure(a).total_cmp(&sure(b)));
@@ -155,7 +158,8 @@ impl WeighedModel {
         })
     }
 
-    /// A larger effect with which it shares a class: either could be the other, so that both together are no finding.
+    /// A larger effect with which it shares a class: either could be the other, so that both
+    /// together are no finding.
     fn twin_beside(&self, assessed: &WeighedEffect) -> Option<EffectName> {
         let name = |effect: &WeighedEffect| effect.found.effect.name;
         let is_twin = |other: &&WeighedEffect| {
@@ -197,13 +201,14 @@ impl WeighedModel {
     }
 }
 
-/// Confidence of an effect in a model with an unsure one: if it does not survive without the unsure one, its confidence is capped at
-/// that one's.
+/// Confidence of an effect in a model with an unsure one: if it does not survive without the unsure
+/// one, its confidence is capped at that one's.
 fn resting(own: f64, unsure: f64, name: EffectName, standing: &[EffectName]) -> f64 {
     if standing.contains(&name) { own } else { own.min(unsure) }
 }
 
-/// Weighs what the search found, and again without what is unsure as long as that makes the rest surer.
+/// Weighs what the search found, and again without what is unsure as long as that makes the rest
+/// surer.
 pub(crate) fn weigh(scales: &Scales, found: StandingModel) -> WeighedModel {
     let best = scales.without_unsure(scales.once(found, None));
     if !best.stands_for_swing() || !best.materials.is_empty() {
@@ -296,8 +301,9 @@ impl Scales<'_> {
         }
     }
 
-    /// A model whose effects have met their rivals, and its fit under white noise. A rival that leads takes the effect's place, once: the
-    /// search adds one effect after another, and what was best then need not be best in the end.
+    /// A model whose effects have met their rivals, and its fit under white noise. A rival that
+    /// leads takes the effect's place, once: the search adds one effect after another, and what was
+    /// best then need not be best in the end.
     fn against_rivals(&self, mut standing: StandingModel) -> (StandingModel, FittedModel) {
         let contest = |standing: &mut StandingModel, patched: &FittedModel| {
             let StandingModel { model, effects, .. } = standing;
@@ -316,7 +322,8 @@ impl Scales<'_> {
         }
     }
 
-    /// A model with a rival in the place of effect `i`, and its fit under white noise; none where the rival may not be named.
+    /// A model with a rival in the place of effect `i`, and its fit under white noise; none where
+    /// the rival may not be named.
     fn replaced(
         &self,
         standing: &StandingModel,
@@ -414,7 +421,8 @@ impl Scales<'_> {
         };
         let confidence = confidence::confidence(&evidence).min(most);
         let creeps = candidates::creeps(&found.effect, context.span)
-            // A spring that creeps depends on time, so no law of the travel fits it everywhere, however far it bends.
+            // A spring that creeps depends on time, so no law of the travel fits it everywhere,
+            // however far it bends.
             .filter(|_| !found.fits_everywhere());
         WeighedEffect { found, class, evidence, confidence, parameters, is_there, undecided, creeps, rather }
     }

@@ -3,8 +3,8 @@
 use crate::effects::EffectName;
 use crate::thresholds::ALIKE;
 
-/// The effect that explains more of the joint between motor and load, where both are of it: what the law of one leaves
-/// next to reversals the other takes. Effects with what they gain.
+/// The effect that explains more of the joint between motor and load, where both are of it: what
+/// the law of one leaves next to reversals the other takes. Effects with what they gain.
 pub(super) fn same_joint(
     (name, gain): (EffectName, f64),
     mut all: impl Iterator<Item = (EffectName, f64)>,

@@ -1,5 +1,5 @@
-//! The evidence for each effect of a fitted model, on left-out blocks of the fitted recordings and on held-out ones. Nothing here
-//! says what is enough to be named.
+//! The evidence for each effect of a fitted model, on left-out blocks of the fitted recordings and
+//! on held-out ones. Nothing here says what is enough to be named.
 
 use crate::effects::{Effect, EffectName};
 use crate::estimation::blocked_recording::BlockedRecording;
@@ -22,10 +22,12 @@ use crate::validation::parameters;
 use crate::validation::residuals::{above, forces, relative_gain};
 use crate::validation::sizes::{played, sizes_on};
 
-/// Least part of a refit's mean square that counts as above the noise: the noise itself is not known exactly.
+/// Least part of a refit's mean square that counts as above the noise: the noise itself is not
+/// known exactly.
 const LEAST_EXPLAINABLE: f64 = 0.2;
 
-/// Gathers the evidence for each effect of a model fitted under white noise; the score is taken under `slow`.
+/// Gathers the evidence for each effect of a model fitted under white noise; the score is taken
+/// under `slow`.
 pub(crate) fn gather_evidence(
     context: &FitContext,
     last: &FittedModel,
@@ -42,7 +44,8 @@ pub(crate) fn gather_evidence(
 struct JudgedModel<'a> {
     context: &'a FitContext<'a>,
     last: &'a FittedModel,
-    /// Held-out recordings in the motion that judges, and in the motion from which force errors come.
+    /// Held-out recordings in the motion that judges, and in the motion from which force errors
+    /// come.
     judging: &'a [BlockedRecording],
     shown: &'a [BlockedRecording],
     estimator: Estimator,
@@ -50,7 +53,8 @@ struct JudgedModel<'a> {
     on_holdout: Vec<HoldoutFit>,
     on_fit: Vec<f64>,
     left: LeftForce,
-    /// Mean square of the force that the null leaves beyond the noise, on fitted and on held-out recordings.
+    /// Mean square of the force that the null leaves beyond the noise, on fitted and on held-out
+    /// recordings.
     explainable: [f64; 2],
 }
 
@@ -129,8 +133,8 @@ impl<'a> JudgedModel<'a> {
         found
     }
 
-    /// Part of what the noise leaves that the model explains and one that leaves `less` does not. What one recording hardly
-    /// shows another may be made for.
+    /// Part of what the noise leaves that the model explains and one that leaves `less` does not.
+    /// What one recording hardly shows another may be made for.
     fn share(&self, less: &LeftForce) -> f64 {
         let square =
             |left: &[Vec<f64>], tracks: &[BlockedRecording]| self.estimator.rms(left, tracks).powi(2);
@@ -140,7 +144,8 @@ impl<'a> JudgedModel<'a> {
             .max((square(&less.fitted, tracks) - square(&self.left.fitted, tracks)) / fitted)
     }
 
-    /// Part of the held-out force error, root mean square, that the model takes off and one that leaves `less` does not.
+    /// Part of the held-out force error, root mean square, that the model takes off and one that
+    /// leaves `less` does not.
     fn off_force(&self, less: &LeftForce) -> f64 {
         let rms = |left: &LeftForce| self.estimator.rms(&left.held_out, self.shown);
         1.0 - rms(&self.left) / rms(less).max(1e-300)
@@ -176,8 +181,8 @@ fn left_force(
     }
 }
 
-/// Standard errors of what one model gains over another under one noise with heavy tails, on left-out blocks of the fitted or on
-/// held-out recordings, whichever are fewer.
+/// Standard errors of what one model gains over another under one noise with heavy tails, on
+/// left-out blocks of the fitted or on held-out recordings, whichever are fewer.
 fn score_z_of(
     context: &FitContext,
     with: &Model,
@@ -185,7 +190,7 @@ fn score_z_of(
     noise: &Noise,
     holdout: &[BlockedRecording],
 ) -> f64 {
-    // What is left, and what the model pays, on fitted and on held-out recordings.
+    // The residual, and what the model pays, on fitted and on held-out recordings.
     let left = |model: &Model| {
         let fit = Fit::new(model, context.nominal, context.tracks, noise);
         let fitted = FittedModel { model: model.clone(), noise: *noise, fit, merit: 0.0 };

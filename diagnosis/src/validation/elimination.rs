@@ -32,9 +32,9 @@ pub(crate) struct StandingModel {
     pub(crate) materials: Vec<Material>,
 }
 
-/// Takes out whatever does not carry to the held-out recordings, the weakest first, until all that is left does, and
-/// judges that; `noise` is white, `null_noise` is the null's coloured one, `materials` are
-/// the effects that shares name.
+/// Takes out whatever does not carry to the held-out recordings, the weakest first, until all that
+/// is left does, and judges that; `noise` is white, `null_noise` is the null's coloured one,
+/// `materials` are the effects that shares name.
 pub(crate) fn eliminate(
     mut model: FittedModel,
     context: &FitContext,
@@ -54,7 +54,8 @@ pub(crate) fn eliminate(
             .iter()
             .enumerate()
             .filter_map(|(i, f)| {
-                // Where other physics limits, nothing explains everything: no likelihood rejects what shares name.
+                // Where other physics limits, nothing explains everything: no likelihood rejects
+                // what shares name.
                 let judged = f.material.is_none().then_some(f)?;
                 let why = judged.rejection().or_else(|| parameters::absence(context, &plain, i))?;
                 Some((i, f.holdout.z, why))

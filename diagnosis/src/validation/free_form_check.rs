@@ -24,9 +24,9 @@ fn share(of_model: f64, taken: &Taken) -> f64 {
     if of_model <= 0.0 { 0.0 } else { of_model / (of_model + beyond) }
 }
 
-/// Compares every effect that would be named with forces of any form; an effect is not named if one of them explains the data
-/// without it. Gives the weighed model with what its effects would rather be, and what a form takes beside all names, if there are
-/// any.
+/// Compares every effect that would be named with forces of any form; an effect is not named if one
+/// of them explains the data without it. Gives the weighed model with what its effects would rather
+/// be, and what a form takes beside all names, if there are any.
 pub(crate) fn check(
     mut weighed: WeighedModel,
     context: &FitContext,
@@ -67,8 +67,9 @@ pub(crate) struct Unnamed {
     pub(crate) holdout_gain: Option<f64>,
 }
 
-/// The force of any form that explains most of what a refit leaves, where that is sure and enough to be reported; with the refit
-/// that has the force beside it, except where each recording has its own place of it.
+/// The force of any form that explains most of what a refit leaves, where that is sure and enough
+/// to be reported; with the refit that has the force beside it, except where each recording has its
+/// own place of it.
 pub(crate) fn alone(
     context: &FitContext,
     refit: &FittedModel,

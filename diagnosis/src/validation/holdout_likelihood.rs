@@ -1,6 +1,7 @@
-//! Held-out recordings judge: coefficients stand as fitted, only what is each recording's own may move (its offset, and the
-//! encoder's zero, on which the phase of periodic effects rests). For likelihoods that is found on other stretches of the
-//! recording than those it judges, as it is on fitted recordings, so that no freedom on held-out rows speaks for an effect.
+//! Held-out recordings judge: coefficients stand as fitted, only what is each recording's own may
+//! move (its offset, and the encoder's zero, on which the phase of periodic effects rests). For
+//! likelihoods that is found on other stretches of the recording than those it judges, as it is on
+//! fitted recordings, so that no freedom on held-out rows speaks for an effect.
 
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::filter::Noise;
@@ -23,13 +24,15 @@ pub(crate) struct HoldoutFit {
     pub(crate) bias: f64,
     /// Cost of each segment with the own values of the others, in log-likelihood.
     pub(crate) costs: Vec<f64>,
-    /// Whitened residual of each block of the segments that the model knows something of, with the own values of the others.
+    /// Whitened residual of each block of the segments that the model knows something of, with the
+    /// own values of the others.
     pub(crate) residual: Vec<f64>,
     /// The price of the jumps found in this recording itself, in log-likelihood.
     pub(crate) surcharge: f64,
 }
 
-/// Pattern of an effect with its own phase: per wave (frequency, cosine, sine), with the recordings' phases undone.
+/// Pattern of an effect with its own phase: per wave (frequency, cosine, sine), with the
+/// recordings' phases undone.
 fn pattern(fit: &Fit, model: &Model, effect: usize) -> Vec<(f64, f64, f64)> {
     let waves: Vec<f64> = waves_of(model, effect);
     let of = |r: usize| -> Vec<(f64, f64, f64)> {
@@ -93,7 +96,8 @@ fn turned((w, c, s): (f64, f64, f64), shift: f64) -> (f64, f64, f64) {
     (w, c * cos + s * sin, s * cos - c * sin)
 }
 
-/// The shift within one period with the largest value: a grid finer than the highest wave, then golden section.
+/// The shift within one period with the largest value: a grid finer than the highest wave, then
+/// golden section.
 fn best_shift(period: f64, highest: f64, value: impl Fn(f64) -> f64) -> f64 {
     let cycles = (period * highest / std::f64::consts::TAU).max(1.0);
     let count = (8.0 * cycles).ceil().clamp(16.0, 4000.0) as usize;
@@ -118,7 +122,8 @@ pub(crate) fn evaluate(
 ) -> HoldoutFit {
     let mut evaluated = evaluate_once(candidate, nominal, track, noise);
     if candidate.model.effects.iter().any(joint::is_joint) {
-        // The law of a joint takes up the force that is there all the time, which evaluating it finds.
+        // The law of a joint takes up the force that is there all the time, which evaluating it
+        // finds.
         let mut own = track.clone();
         for _ in 0..BIASES {
             own.bias = evaluated.bias;
@@ -187,10 +192,12 @@ fn evaluate_once(
     }
 }
 
-/// An effect of which each recording has its own phase: its waves, their columns, and what the fitted recordings say of it.
+/// An effect of which each recording has its own phase: its waves, their columns, and what the
+/// fitted recordings say of it.
 struct Pattern {
     shape: Vec<(f64, f64, f64)>,
-    /// Waves that share a shift, with the columns of their cosines and sines, the shift's period and their highest wave.
+    /// Waves that share a shift, with the columns of their cosines and sines, the shift's period
+    /// and their highest wave.
     groups: Vec<(Vec<usize>, Vec<usize>, f64, f64)>,
 }
 
@@ -242,7 +249,8 @@ impl Sums {
         self.b[i] - others.map(|j| self.m.at(i, j) * (theta[j] - one.reference[j])).sum::<f64>()
     }
 
-    /// `theta` with what is the recording's own, its offset and the phases of its patterns, found on these segments.
+    /// `theta` with what is the recording's own, its offset and the phases of its patterns, found
+    /// on these segments.
     fn own_values(&self, mut theta: Vec<f64>, one: &Prepared, patterns: &[Option<Pattern>]) -> Vec<f64> {
         let offset = one.columns.iter().position(|c| c.key == Key::Offset);
         // Twice round, because offset and phases lean on each other.

@@ -1,5 +1,5 @@
-//! Held-out recordings with the motion that a fitted model sees in them, estimated twice: what judges a name may know no later
-//! row, and how large a force is left is best told from all rows.
+//! Held-out recordings with the motion that a fitted model sees in them, estimated twice: what
+//! judges a name may know no later row, and how large a force is left is best seen from all rows.
 
 use crate::effects::definition::Span;
 use crate::estimation::blocked_recording::BlockedRecording;
@@ -17,11 +17,11 @@ use std::borrow::Cow;
 /// Held-out recordings, both times in the order given.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct HoldoutSet {
-    /// Each block's motion from the rows until then. Likelihood gains come from here: a smoother knows the disturbance from
-    /// which a force is to be told.
+    /// Each block's motion from the rows until then. Likelihood gains come from here: a smoother
+    /// knows the disturbance from which a force is to be told.
     pub(crate) filtered: Vec<BlockedRecording>,
-    /// Each block's motion from all rows. Force errors come from here: where counts are coarse the error of a filtered
-    /// speed would be most of them.
+    /// Each block's motion from all rows. Force errors come from here: where counts are coarse the
+    /// error of a filtered speed would be most of them.
     pub(crate) smoothed: Vec<BlockedRecording>,
 }
 
@@ -31,7 +31,8 @@ impl HoldoutSet {
         Self { filtered: tracks.clone(), smoothed: tracks }
     }
 
-    /// Estimates both motions with a fitted model; `scale` is the acceleration that the command makes.
+    /// Estimates both motions with a fitted model; `scale` is the acceleration that the command
+    /// makes.
     pub(crate) fn follow(&mut self, candidate: &FittedModel, nominal: &Nominal, span: &Span, scale: f64) {
         follow(candidate, nominal, span, &mut self.filtered, scale, Knows::Past);
         follow(candidate, nominal, span, &mut self.smoothed, scale, Knows::All);
@@ -65,7 +66,8 @@ fn follow(
     knows: Knows,
 ) {
     let count = 1.0 / nominal.rig.encoder.counts_per_unit;
-    // The first look trusts no friction: its sign is not known yet, and a filter that believes in the wrong one keeps to it.
+    // The first look trusts no friction: its sign is not known yet, and a filter that believes in
+    // the wrong one keeps to it.
     let drives: Vec<Total> = tracks.iter().map(|track| track.command_total(nominal.gain())).collect();
     let first = guess(tracks, scale);
     estimate_motion(tracks, &drives, &first, count, knows);

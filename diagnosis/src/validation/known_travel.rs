@@ -1,5 +1,5 @@
-//! The travel over which held-out recordings may judge: a law fitted over the travel says nothing of travel that no fitted
-//! recording covers.
+//! The travel over which held-out recordings may judge: a law fitted over the travel says nothing
+//! of travel that no fitted recording covers.
 
 use crate::effects::Effect;
 use crate::effects::definition::Span;

@@ -1,4 +1,5 @@
-//! Validation of fitted models on held-out recordings: gains, alternatives, residual maps, and confidence.
+//! Validation of fitted models on held-out recordings: gains, alternatives, residual maps, and
+//! confidence.
 
 pub(crate) mod acceptance_criteria;
 pub(crate) mod alternatives;

@@ -1,6 +1,7 @@
-//! Physics that has no name in the library and looks like some that has: a spring that creeps, a load that changes at once,
-//! an inertia that changes along the travel, a gear that loses a part of what it carries. Nothing here is named; it only
-//! speaks against a name. What there is stands with the laws that it is a form of, in `effects`.
+//! Physics that has no name in the library and looks like some that has: a spring that creeps, a
+//! load that changes at once, an inertia that changes along the travel, a gear that loses a part of
+//! what it carries. Nothing here is named; it only speaks against a name. Such forces are defined
+//! with the laws that they are a form of, in `effects`.
 
 use crate::effects::definition::Unnamed;
 use crate::effects::{Effect, EffectName};
@@ -29,7 +30,8 @@ pub(crate) struct Foreign {
     pub(crate) share: f64,
 }
 
-/// Physics without a name that explains most of what a refit leaves where nothing is named, as surely as a name must.
+/// Physics without a name that explains most of what a refit leaves where nothing is named, as
+/// surely as a name must.
 pub(crate) fn alone(context: &FitContext, refit: &FittedModel, holdout: &HoldoutSet) -> Option<Foreign> {
     let all = unnamed_like(None, context);
     let model = |foreign: &Unnamed| Model { effects: vec![foreign.effect.clone()], ..Model::default() };
@@ -45,8 +47,8 @@ pub(crate) fn alone(context: &FitContext, refit: &FittedModel, holdout: &Holdout
     is_sure.then_some(Foreign { what: best.what, share: found.share.min(1.0) })
 }
 
-/// Returns the physics without a name that explains more, with certainty, than a fitted effect; `gain` is the
-/// effect's own.
+/// Returns the physics without a name that explains more, with certainty, than a fitted effect;
+/// `gain` is the effect's own.
 pub(crate) fn rather(context: &FitContext, fitted: &FittedModel, effect: usize, gain: f64) -> Option<Rather> {
     let more = |foreign: &Unnamed| {
         let mut model = fitted.model.clone();

@@ -1,4 +1,5 @@
-//! From coefficients to the numbers of the report: values in the rig's units with intervals, by the contract's names.
+//! From coefficients to the numbers of the report: values in the rig's units with intervals, by the
+//! contract's names.
 
 use crate::effects::definition::{Fitted, NominalTerm, Reported};
 use crate::effects::{Effect, EffectName as N};
@@ -10,8 +11,8 @@ use crate::selection::context::{FitContext, FittedModel};
 use crate::validation::rejection::Rejection;
 use std::collections::BTreeMap;
 
-/// Inertia and gain that go with a fitted ratio of the two, by what the rig declares of each; and the relative standard
-/// deviation of their common scale, which no recording of motion can narrow.
+/// Inertia and gain that go with a fitted ratio of the two, by what the rig declares of each; and
+/// the relative standard deviation of their common scale, which no recording of motion can narrow.
 pub(crate) fn scale(nominal: &Nominal, candidate: &FittedModel) -> (f64, f64, f64) {
     let rig = &nominal.rig;
     let ratio = candidate.fit.value(Key::Gain).unwrap_or(nominal.gain());
@@ -96,20 +97,20 @@ pub(crate) fn is_there(name: N, parameters: &BTreeMap<String, Parameter>) -> boo
     parameters.is_empty() || sizes(name, parameters).any(|p| p.ci95[0] * p.ci95[1] > 0.0)
 }
 
-/// True if at least one size of an effect is not zero. That is enough where its shares on fitted and on held-out recordings say that it is
-/// there: the interval allows for all else that the model leaves.
+/// True if at least one size of an effect is not zero. That is enough where its shares on fitted
+/// and on held-out recordings say that it is there: the interval allows for all else that the model
+/// leaves.
 pub(crate) fn has_size(name: N, parameters: &BTreeMap<String, Parameter>) -> bool {
     parameters.is_empty() || sizes(name, parameters).any(|p| p.value != 0.0)
 }
 
 /// The parameters that are sizes, and do not say where or when an effect acts.
 fn sizes(name: N, parameters: &BTreeMap<String, Parameter>) -> impl Iterator<Item = &Parameter> {
-    let drifts = name.definition().drifts();
-    let is_size = move |key: &str| !(key.starts_with("period") || (drifts && key == "time_constant"));
-    parameters.iter().filter(move |(key, _)| is_size(key)).map(|(_, p)| p)
+    parameters.iter().filter(move |(key, _)| name.definition().is_size(key)).map(|(_, p)| p)
 }
 
-/// Returns why an effect of a fitted model may not be named although it explains something: its own size may be zero.
+/// Returns why an effect of a fitted model may not be named although it explains something: its own
+/// size may be zero.
 pub(crate) fn absence(context: &FitContext, fitted: &FittedModel, effect: usize) -> Option<Rejection> {
     let name = fitted.model.effects[effect].name;
     let is_there = is_there(name, &parameters(context, fitted, effect));

@@ -1,5 +1,6 @@
-//! A plain regression of what a model leaves on what was recorded: speed, its sign, travel, angle, and the command a little
-//! earlier. A mismatch is called random only where none of them predicts it on recordings that it was not fitted to.
+//! A plain regression of what a model leaves on what was recorded: speed, its sign, travel, angle,
+//! and the command a little earlier. A mismatch is called random only where none of them predicts
+//! it on recordings that it was not fitted to.
 
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::force_residual::Estimator;
@@ -8,11 +9,12 @@ use crate::thresholds::SURE_Z;
 use crate::validation::residuals::{Residuals, relative_gain};
 use std::f64::consts::TAU;
 
-/// Part of the mean square of what is left that a regression must predict on held-out recordings.
+/// Part of the residual's mean square that a regression must predict on held-out recordings.
 const PREDICTS: f64 = 0.1;
 /// Delays of the command that are tried, s.
 const DELAYS_S: [f64; 6] = [0.002, 0.005, 0.01, 0.02, 0.04, 0.08];
-/// Factor between the sizes of a delay by the recorded command and by the one that the motion asks for.
+/// Factor between the sizes of a delay by the recorded command and by the one that the motion asks
+/// for.
 const SAME_SIZE: f64 = 2.0;
 /// Orders of a turn that are tried together.
 const ORDERS: u32 = 24;
@@ -36,8 +38,9 @@ impl<'a> Left<'a> {
 /// Columns of a regression: per recording, per column, per block.
 type Columns = Vec<Vec<Vec<f64>>>;
 
-/// Returns the best predictor of the residual on the held-out recordings, as a noun phrase, and the share that it predicts; none if
-/// nothing does. `turn` is the travel of one turn, rad or m, where the axis has turns.
+/// Returns the best predictor of the residual on the held-out recordings, as a noun phrase, and the
+/// share that it predicts; none if nothing does. `turn` is the travel of one turn, rad or m, where
+/// the axis has turns.
 pub(crate) fn follows(
     fit: &Left,
     holdout: &Left,
@@ -97,8 +100,9 @@ fn of_motion(left: &Left, of: &dyn Fn(&BlockedRecording, usize) -> Vec<f64>) -> 
     left.tracks.iter().map(one).collect()
 }
 
-/// The part that the best delay of the command predicts. Under feedback the command follows the disturbance, and without it the
-/// motion does: only what both the recorded command and the one that the motion asks for show is a delay.
+/// The part that the best delay of the command predicts. Under feedback the command follows the
+/// disturbance, and without it the motion does: only what both the recorded command and the one
+/// that the motion asks for show is a delay.
 fn delay(fit: &Left, holdout: &Left, estimator: &Estimator) -> Option<f64> {
     let later = |left: &Left, seconds: f64| -> Columns {
         shifted(left, seconds, |force, _, j, by| force[j.saturating_sub(by)] - force[j])
@@ -142,7 +146,8 @@ fn centred(column: &[f64], moving: &[bool]) -> Vec<f64> {
     column.iter().map(|x| x - mean).collect()
 }
 
-/// Least squares of what is left on the columns, over all recordings; none where the columns do not change.
+/// Least squares of the residual on the columns, over all recordings; none where the columns do not
+/// change.
 fn solve(left: &Left, columns: &Columns) -> Option<Vec<f64>> {
     let count = columns.first()?.len();
     let (mut information, mut score) = (Square::zero(count), vec![0.0; count]);
@@ -162,7 +167,8 @@ fn solve(left: &Left, columns: &Columns) -> Option<Vec<f64>> {
     (theta.iter().all(|x| x.is_finite()) && theta.iter().any(|x| *x != 0.0)).then_some(theta)
 }
 
-/// Part of the mean square of what is left that coefficients predict; none where that is not sure or is little.
+/// Part of the residual's mean square that coefficients predict; none where that is not sure or is
+/// little.
 fn gain(left: &Left, columns: &Columns, theta: &[f64], estimator: &Estimator) -> Option<f64> {
     let (mut before, mut after) = (Vec::new(), Vec::new());
     for ((columns, residual), moving) in columns.iter().zip(left.residual).zip(&left.moving) {

@@ -1,4 +1,5 @@
-//! The reason why an effect is not named: the criterion that it does not meet, with its figures. `report::text` turns it into a sentence.
+//! The reason why an effect is not named: the criterion that it does not meet, with its figures.
+//! `report::text` turns it into a sentence.
 
 use crate::effects::EffectName;
 use crate::numerics::bootstrap::Gain;
@@ -15,15 +16,18 @@ pub(crate) enum Rejection {
     UnlikelyGain { z: f64 },
     /// The interval of the gain on held-out recordings holds zero.
     MayGainNothing { gain: Gain },
-    /// The gain is not sure on fitted and on held-out recordings, and the effect does not explain most.
+    /// The gain is not sure on fitted and on held-out recordings, and the effect does not explain
+    /// most.
     NotSure { fit_z: f64, holdout_z: f64, share: f64 },
     /// The gain rests on few moments of the fitted recordings.
     FewMoments { fit_z: f64, holdout_z: f64 },
     /// The effect explains too little of what the noise leaves, however sure it is.
     TooSmall { share: f64 },
-    /// The effect explains less than `least` of what the noise leaves, and is not sure enough for that.
+    /// The effect explains less than `least` of what the noise leaves, and is not sure enough for
+    /// that.
     SmallAndUnsure { share: f64, least: f64, z: f64 },
-    /// The effect takes so small a part off the held-out force error that the simulation is right without it.
+    /// The effect takes so small a part off the held-out force error that the simulation is right
+    /// without it.
     Immaterial { part: f64 },
     /// The waves are not those of teeth or poles.
     NotPeriodic,
@@ -60,7 +64,8 @@ pub(crate) enum Rejection {
 pub(crate) enum Rather {
     /// Physics without a name in the library; a noun phrase.
     Unnamed { what: String },
-    /// A force of a form that the effect cannot have: gains on left-out blocks, nats, of the form and of the effect.
+    /// A force of a form that the effect cannot have: gains on left-out blocks, nats, of the form
+    /// and of the effect.
     FreeForm { over: Inputs, form: f64, effect: f64 },
 }
 

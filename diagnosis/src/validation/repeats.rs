@@ -1,14 +1,17 @@
-//! The test whether the residual repeats where the motion repeats: recordings of one trajectory, or periods of one recording.
+//! The test whether the residual repeats where the motion repeats: recordings of one trajectory, or
+//! periods of one recording.
 //!
-//! Repeats are found from the motion itself (or from what the loop was asked to follow, where that is recorded); the residuals of
-//! aligned stretches are then correlated. A disturbance that comes from outside does not know when the motion repeats.
+//! Repeats are found from the motion itself (or from what the loop was asked to follow, where that
+//! is recorded); the residuals of aligned stretches are then correlated. A disturbance that comes
+//! from outside does not know when the motion repeats.
 
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::numerics::linear::correlation;
 
 /// The smallest correlation of the motion at which one stretch repeats another.
 const SAME_MOTION: f64 = 0.97;
-/// The smallest correlation of residuals that repeat, and the standard errors by which it must exceed chance.
+/// The smallest correlation of residuals that repeat, and the standard errors by which it must
+/// exceed chance.
 const REPEATS: f64 = 0.5;
 const SURELY: f64 = 4.0;
 /// Shortest stretch that is compared, s, and shift within which recordings are aligned, s.
@@ -17,7 +20,8 @@ const SHIFT_S: f64 = 1.0;
 /// Samples per second that are compared: enough for the motion of most machines.
 const RATE_HZ: f64 = 50.0;
 
-/// One recording with what is left of it, evenly sampled: the speed or the reference's, and the residual, zero where not known.
+/// One recording with its residual, evenly sampled: the speed or the reference's, and the residual,
+/// zero where not known.
 struct Sampled {
     motion: Vec<f64>,
     left: Vec<f64>,
@@ -47,8 +51,9 @@ fn compared(a: (&[f64], &[f64]), b: (&[f64], &[f64])) -> Option<(f64, f64)> {
     Some((correlation(&a.1[..n], &b.1[..n]), n as f64))
 }
 
-/// Correlation of what is left between repeats of a motion, where the recordings hold any and it is surely more than chance;
-/// `independent_hz` is how many samples a second say something of their own.
+/// Correlation of the residual between repeats of a motion, where the recordings hold any and it is
+/// surely more than chance; `independent_hz` is how many samples a second say something of their
+/// own.
 pub(crate) fn correlation_of_repeats(
     tracks: &[BlockedRecording],
     residuals: &[Vec<f64>],

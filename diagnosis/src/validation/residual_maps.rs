@@ -1,4 +1,5 @@
-//! The place of the residual: maps over states that carry from the fitted to the held-out recordings, and intervals of time.
+//! The place of the residual: maps over states that carry from the fitted to the held-out
+//! recordings, and intervals of time.
 
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::numerics::bootstrap::{Gain, bootstrap};
@@ -101,7 +102,8 @@ impl Bins {
         sums.into_iter().map(|cells| cells.map(mean)).collect()
     }
 
-    /// Returns the gain of the means on each segment of a recording, and the sum of squares of the residual.
+    /// Returns the gain of the means on each segment of a recording, and the sum of squares of the
+    /// residual.
     fn gains(&self, means: &Means, one: &Seen) -> (Vec<f64>, f64) {
         let (mut gains, mut whole) = (vec![0.0; one.track.segment_count()], 0.0);
         for (gain, w) in gains.iter_mut().zip(one.track.blocks.segments.windows(2)) {
@@ -115,7 +117,8 @@ impl Bins {
         (gains, whole)
     }
 
-    /// True if the others predict something of each recording: a slow disturbance looks like a map of one or two.
+    /// True if the others predict something of each recording: a slow disturbance looks like a map
+    /// of one or two.
     fn repeats(&self, seen: &[Seen]) -> bool {
         if seen.len() < 2 {
             return true;
@@ -128,7 +131,8 @@ impl Bins {
     }
 }
 
-/// Averages residuals over bins on the fitted recordings and asks the held-out ones whether that was luck.
+/// Averages residuals over bins on the fitted recordings and asks the held-out ones whether that
+/// was luck.
 pub(crate) fn maps(
     fit: (&[BlockedRecording], &[Vec<f64>]),
     holdout: (&[BlockedRecording], &[Vec<f64>]),
@@ -150,7 +154,8 @@ pub(crate) fn maps(
                 gains.extend(of_one);
                 whole += square;
             }
-            // In units of a segment's mean square, so that the limit per witness means the same everywhere.
+            // In units of a segment's mean square, so that the limit per witness means the same
+            // everywhere.
             let unit = (whole / gains.len().max(1) as f64).max(1e-300);
             gains.iter_mut().for_each(|gain| *gain /= unit);
             let gain: Gain = bootstrap(&gains);
@@ -166,7 +171,8 @@ pub(crate) fn maps(
         .collect()
 }
 
-/// Stretches of time, s, in which a weight per block is high, merged where they nearly touch; the strongest 24.
+/// Stretches of time, s, in which a weight per block is high, merged where they nearly touch; the
+/// strongest 24.
 pub(crate) fn intervals(track: &BlockedRecording, weight: &[f64]) -> Vec<[f64; 2]> {
     let n = track.block_count();
     let length = (0.1 * track.block_rate()).ceil().max(1.0) as usize;

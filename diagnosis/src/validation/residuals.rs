@@ -1,5 +1,5 @@
-//! Residual forces as people see them: under the nominal, the refitted and the patched model, and what one takes from
-//! the other.
+//! Residual forces as people see them: under the nominal, the refitted and the patched model, and
+//! what one takes from the other.
 
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::force_residual::Estimator;
@@ -28,7 +28,8 @@ pub(crate) fn forces(
 /// Part of the inertia's force below which the drive is not what moves the axis.
 const DRIVES: f64 = 0.2;
 
-/// The force that moves the axis, the drive's where it has one, per block, as an estimator of this bandwidth sees it.
+/// The force that moves the axis, the drive's where it has one, per block, as an estimator of this
+/// bandwidth sees it.
 pub(crate) fn drive_force(
     nominal: &Nominal,
     estimator: &Estimator,
@@ -45,7 +46,8 @@ pub(crate) fn drive_force(
     if estimator.rms(&drive, tracks) < DRIVES * estimator.rms(&all, tracks) { all } else { drive }
 }
 
-/// Residual force per recording and block under the three models, and the drive's force, all by one estimator.
+/// Residual force per recording and block under the three models, and the drive's force, all by one
+/// estimator.
 pub(crate) struct Residuals {
     pub(crate) force: Vec<Vec<f64>>,
     pub(crate) nominal: Vec<Vec<f64>>,
@@ -93,10 +95,12 @@ pub(crate) fn above(residual: f64, chance: f64, least: f64) -> f64 {
     (whole - chance * chance).max(least * whole)
 }
 
-/// Part of the force that a refit must take from the held-out residual before values are called wrong.
+/// Part of the force that a refit must take from the held-out residual before values are called
+/// wrong.
 const REFIT_MATTERS: f64 = 0.02;
 
-/// True if other values explain held-out recordings better than the rig's own, each recording's bias left aside.
+/// True if other values explain held-out recordings better than the rig's own, each recording's
+/// bias left aside.
 pub(crate) fn refit_matters(
     estimator: &Estimator,
     tracks: &[BlockedRecording],

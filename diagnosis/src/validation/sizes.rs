@@ -3,7 +3,8 @@
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::force_residual::Estimator;
 
-/// Least mean square of an effect on a recording, relative to the largest on any, for the recording to count as exciting it.
+/// Least mean square of an effect on a recording, relative to the largest on any, for the recording
+/// to count as exciting it.
 const PLAYED: f64 = 0.03;
 
 /// Returns the sizes on the recordings that excite an effect, fitted ones first.
@@ -24,7 +25,8 @@ pub(crate) struct Size {
     square: f64,
 }
 
-/// Returns the size of an effect on each recording; its force is the difference of the residuals with it and without it.
+/// Returns the size of an effect on each recording; its force is the difference of the residuals
+/// with it and without it.
 pub(crate) fn sizes_on(
     estimator: &Estimator,
     tracks: &[BlockedRecording],

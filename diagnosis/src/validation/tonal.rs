@@ -1,6 +1,6 @@
-//! A tonal disturbance: a force that swings at a frequency of its own, whatever the axis does, and explains a residual without
-//! being an effect.
-//! Under a loop the command answers it, and delays, lags and springs take it on.
+//! A tonal disturbance: a force that swings at a frequency of its own, whatever the axis does, and
+//! explains a residual without being an effect. Under a loop the command answers it, and delays,
+//! lags and springs take it on.
 
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::force_residual::Estimator;
@@ -13,15 +13,17 @@ use std::f64::consts::TAU;
 const OVERSAMPLED: f64 = 2.6;
 /// Fewest cycles over the longest recording: less is a drift.
 const FEWEST_CYCLES: f64 = 12.0;
-/// Most of the motion, as parts of its mean square, that may be at the frequency of a swing that does not follow it, for
-/// a light axis gives way to it, and that may be about as fast otherwise: what repeats with the motion swings too, at its
-/// frequency and multiples of it. Both grow, as far as `ROOM` times, with how little of the residual is left beside the
-/// swing, for what repeats with the motion leaves much.
+/// Most of the motion, as parts of its mean square, that may be at the frequency of a swing that
+/// does not follow it, for a light axis gives way to it, and that may be about as fast otherwise:
+/// what repeats with the motion swings too, at its frequency and multiples of it. Both grow, as far
+/// as `ROOM` times, with how little of the residual is left beside the swing, for what repeats with
+/// the motion leaves much.
 const GIVES_WAY: f64 = 0.06;
 const FAST_MOTION: f64 = 0.02;
 const ROOM: f64 = 4.0;
-/// Most that the drive may do at that frequency, over the swing's mean square: a loop answers what comes from outside with
-/// half as much again at most, and what a lag or a short delay leaves is less than the drive makes.
+/// Most that the drive may do at that frequency, over the swing's mean square: a loop answers what
+/// comes from outside with half as much again at most, and what a lag or a short delay leaves is
+/// less than the drive makes.
 const DRIVEN: f64 = 2.25;
 
 /// A force at one frequency on the held-out recordings.
@@ -38,8 +40,8 @@ pub(crate) struct TonalDisturbance {
 
 /// The smallest part at which a swing is the missing physics.
 const DOMINANT: f64 = 0.4;
-/// Part of the rest from which effects explain more than a swing: a delay leaves much where its command has a tone, and something
-/// everywhere else.
+/// Part of the rest from which effects explain more than a swing: a delay leaves much where its
+/// command has a tone, and something everywhere else.
 const MORE_THAN_SWING: f64 = 0.3;
 
 impl TonalDisturbance {
@@ -110,7 +112,8 @@ fn square(all: &[Samples]) -> f64 {
     all.iter().flat_map(|one| &one.values).map(|x| x * x).sum::<f64>().max(1e-300)
 }
 
-/// Sum of squares of what is about as fast as `hertz` or faster: of what a mean over a period leaves.
+/// Sum of squares of what is about as fast as `hertz` or faster: of what a mean over a period
+/// leaves.
 fn fast(all: &[Samples], hertz: f64) -> f64 {
     let fast = |one: &Samples| -> f64 {
         let reach = ((0.5 / hertz / one.step_s).round() as usize).max(1);
@@ -127,14 +130,16 @@ fn fast(all: &[Samples], hertz: f64) -> f64 {
     all.iter().map(fast).sum()
 }
 
-/// True if a swing that is `part` of the residual may go its own way, for the axis does not move as fast.
+/// True if a swing that is `part` of the residual may go its own way, for the axis does not move as
+/// fast.
 fn is_apart(motion: &[Samples], hertz: f64, part: f64) -> bool {
     let room = (1.0 / (1.0 - part)).clamp(1.0, ROOM);
     let (whole, there) = (square(motion), explained(motion, hertz));
     there < GIVES_WAY * room * whole && fast(motion, hertz) - there < FAST_MOTION * room * whole
 }
 
-/// The frequency at which a swing would explain the most of what the refit leaves on the fitted recordings.
+/// The frequency at which a swing would explain the most of what the refit leaves on the fitted
+/// recordings.
 pub(crate) fn frequency(estimator: &Estimator, fit: &Left) -> Option<f64> {
     let left = samples(estimator, fit.tracks, fit.refit);
     let apart = apart(&left);
@@ -148,7 +153,7 @@ pub(crate) fn frequency(estimator: &Estimator, fit: &Left) -> Option<f64> {
     Some(nearby(coarse, apart, &left))
 }
 
-/// Distance of frequencies that recordings of this length tell apart, halved.
+/// Distance of frequencies that recordings of this length distinguish, halved.
 fn apart(all: &[Samples]) -> f64 {
     0.5 / all.iter().map(Samples::seconds).fold(f64::MIN_POSITIVE, f64::max)
 }
@@ -157,7 +162,8 @@ fn nearby(hertz: f64, apart: f64, all: &[Samples]) -> f64 {
     golden(hertz - apart, hertz + apart, 10, |hertz| explained(all, hertz))
 }
 
-/// The swing at about `hertz` as held-out recordings show it; none where the axis itself moves or is driven so.
+/// The swing at about `hertz` as held-out recordings show it; none where the axis itself moves or
+/// is driven so.
 pub(crate) fn swing(estimator: &Estimator, hertz: f64, holdout: &Left) -> Option<TonalDisturbance> {
     let of_held = |signals: &[Vec<f64>]| samples(estimator, holdout.tracks, signals);
     let (before, after) = (of_held(holdout.refit), of_held(holdout.patched));

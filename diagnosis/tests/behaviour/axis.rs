@@ -7,11 +7,13 @@ use diagnosis::rig::Rig;
 use diagnosis::{Outcome, diagnose_recordings};
 use std::f64::consts::TAU;
 
-/// A machine: inertia, viscous and dry friction, the latter's part against backward motion, gravity, a constant force, delay and
-/// lag of its drive, the first-order filter behind which its position is read, the command at which the drive is limited, dry
-/// friction that comes and goes along the travel where the axis is slow, cogging of twelve a turn, a push that follows the time since
-/// the start, the frequency of the belt behind which half of it stands (none where zero), the part of its dry friction that comes
-/// on top while it is cold, for some 3 s, and the part of its drive's force that is lost after that time.
+/// A machine: inertia, viscous and dry friction, the latter's part against backward motion,
+/// gravity, a constant force, delay and lag of its drive, the first-order filter behind which its
+/// position is read, the command at which the drive is limited, dry friction that comes and goes
+/// along the travel where the axis is slow, cogging of twelve a turn, a push that follows the time
+/// since the start, the frequency of the belt behind which half of it is (none where zero), the
+/// part of its dry friction that comes on top while it is cold, for some 3 s, and the part of its
+/// drive's force that is lost after that time.
 #[derive(Clone, Copy)]
 pub struct Machine {
     pub inertia: f64,
@@ -79,7 +81,8 @@ fn white(seed: u64) -> impl FnMut() -> f64 {
     }
 }
 
-/// Runs the machine under a command over time; `seed` draws a white disturbance of 1 % of its dry friction.
+/// Runs the machine under a command over time; `seed` draws a white disturbance of 1 % of its dry
+/// friction.
 pub fn record(machine: Machine, taken: Taken, seed: u64, command: impl Fn(f64) -> f64) -> Recording {
     let steps = 40;
     let h = 1.0 / taken.rate / f64::from(steps);
@@ -140,7 +143,8 @@ pub fn record(machine: Machine, taken: Taken, seed: u64, command: impl Fn(f64) -
     out
 }
 
-/// Speed after a step of `h` s under a force, viscous friction per speed, and dry friction that holds, all over the mass.
+/// Speed after a step of `h` s under a force, viscous friction per speed, and dry friction that
+/// holds, all over the mass.
 fn slid(v: f64, h: f64, force: f64, viscous: f64, dry: f64) -> f64 {
     if v == 0.0 && force.abs() <= dry {
         return 0.0;

@@ -1,4 +1,5 @@
-//! A small simulator for calibrating thresholds: written from the physics, apart from the crate's own effect models.
+//! A small simulator for calibrating thresholds: written from the physics, apart from the crate's
+//! own effect models.
 #![allow(dead_code, unused_imports, unreachable_pub, missing_docs)]
 
 use diagnosis::recording::Recording;
@@ -12,7 +13,8 @@ mod machine;
 pub use machine::{B, C, COUNTS, GAIN, GRIP, J, Random, Setup, WARM_SQUARE};
 use machine::{Excitation, Machine, Moment};
 
-/// The nominal rig, with values off by the given relative errors of inertia, viscous, coulomb and gain.
+/// The nominal rig, with values off by the given relative errors of inertia, viscous, coulomb and
+/// gain.
 pub fn rig(off: [f64; 4], extra: &str) -> Rig {
     let text = format!(
         "format = 1\nname = \"simulated\"\nkind = \"rotary\"\n[model]\ninertia = {}\nviscous = {}\ncoulomb = {}\n{extra}\n\

@@ -1,5 +1,6 @@
-//! Faults of input and estimation that recordings of real machines showed, each on a small simulated one: starts in motion,
-//! free swings, slow rates, idle stretches, short recordings, plain forces in pairs, machines without inertia to speak of.
+//! Faults of input and estimation that recordings of real machines showed, each on a small
+//! simulated one: starts in motion, free swings, slow rates, idle stretches, short recordings,
+//! plain forces in pairs, machines without inertia to speak of.
 
 use crate::axis::{AXIS, BENCH, Machine, Taken, WHOLE, diagnosed, mixed, names, record, rig};
 use diagnosis::Verdict;
@@ -288,7 +289,8 @@ fn a_drive_that_is_limited_in_few_rows_is_no_outlier() {
     assert!((26.0..28.0).contains(&limit), "{limit}");
 }
 
-/// The axis swings at up to 12 Hz: nearly all that the drive withholds it withholds within 10 ms of a reversal.
+/// The axis swings at up to 12 Hz: nearly all that the drive withholds it withholds within 10 ms of
+/// a reversal.
 #[test]
 fn a_drive_that_clips_softly_at_reversals_is_named() {
     let swings = |f: f64| move |t: f64| 30.0 * (TAU * f * t).sin() * (0.55 + 0.45 * (TAU * 0.4 * t).sin());

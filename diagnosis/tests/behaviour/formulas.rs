@@ -1,5 +1,5 @@
-//! An effect of a user's own: hidden in a simulated machine by its formula, searched for with its values unknown, named,
-//! patched and simulated.
+//! An effect of a user's own: hidden in a simulated machine by its formula, searched for with its
+//! values unknown, named, patched and simulated.
 
 use crate::common::Random;
 use diagnosis::rig::Rig;
@@ -75,7 +75,8 @@ fn a_hidden_formula_is_found_by_its_name_and_simulated() {
         value("a"),
         value("b")
     );
-    // The patched rig holds it, can be read again, and follows the motion better than the refitted one.
+    // The patched rig holds it, can be read again, and follows the motion better than the refitted
+    // one.
     let text = outcome.patched_rig.to_toml();
     assert!(text.contains("name = \"formula\"") && text.contains("title = \"droop\""), "{text}");
     let again = Rig::parse(&text, "patched-rig.toml").expect("the patched rig is a rig");

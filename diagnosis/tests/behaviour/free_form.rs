@@ -1,4 +1,5 @@
-//! Physics that has no name: what no law of the library makes is told by its inputs, and what has a name keeps it.
+//! Physics that has no name: what no law of the library makes is reported by its inputs, and what
+//! has a name keeps it.
 
 use crate::common::{Setup, record, rig};
 use diagnosis::effects::{EffectName, Variable};

@@ -1,4 +1,5 @@
-//! A drive that holds its axis between moves: a fine encoder counts the jitter there, and what friction does is a reaction.
+//! A drive that holds its axis between moves: a fine encoder counts the jitter there, and what
+//! friction does is a reaction.
 
 use crate::axis::{diagnosed, names, rig};
 use diagnosis::Outcome;
@@ -16,7 +17,8 @@ const FRAME: (f64, f64) = (9.0, 2e-5);
 /// Seconds that a move and the hold after it take.
 const TURN_S: f64 = 2.0;
 
-/// Place, speed and acceleration of moves to and fro over `far`, each a second long and followed by a second's hold.
+/// Place, speed and acceleration of moves to and fro over `far`, each a second long and followed by
+/// a second's hold.
 fn moves(t: f64, far: f64) -> [f64; 3] {
     let within = (t % TURN_S).min(1.0);
     let back = (t / TURN_S) as u32 % 2 == 1;
@@ -27,8 +29,8 @@ fn moves(t: f64, far: f64) -> [f64; 3] {
     [from + sign * far * place, sign * far * speed, sign * far * bend]
 }
 
-/// A recording of 16 s by the equation of motion, with friction that falls from `peak` N·m more as speed rises from zero. The command holds
-/// what the last move left of the friction.
+/// A recording of 16 s by the equation of motion, with friction that falls from `peak` N·m more as
+/// speed rises from zero. The command holds what the last move left of the friction.
 fn recorded(seed: u64, peak: f64) -> Recording {
     let far = 0.4 + 0.15 * seed as f64;
     let mut out = Recording { file: format!("{seed}.csv"), ..Recording::default() };

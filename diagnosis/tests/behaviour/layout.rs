@@ -28,7 +28,8 @@ fn sources(dir: &Path, out: &mut Vec<PathBuf>) {
     }
 }
 
-/// Folders of the crate that a line of code names: `crate::folder`, also in `use crate::{a::…, b::…}`.
+/// Folders of the crate that a line of code names: `crate::folder`, also in `use crate::{a::…,
+/// b::…}`.
 fn named(line: &str) -> Vec<usize> {
     let code = line.split("//").next().unwrap_or("");
     let mut out = Vec::new();
@@ -69,10 +70,11 @@ fn each_folder_uses_only_those_before_it() {
         }
     }
     assert!(arrows > 100, "only {arrows} uses were seen: the reader of sources is blind");
-    assert!(upward.is_empty(), "folders use what stands above them:\n{}", upward.join("\n"));
+    assert!(upward.is_empty(), "folders use those above them:\n{}", upward.join("\n"));
 }
 
-/// Files outside the folders: the crate's root, and the numbers that decide, which every folder may read and which use none.
+/// Files outside the folders: the crate's root, and the numbers that decide, which every folder may
+/// read and which use none.
 const BESIDE: [&str; 2] = ["lib.rs", "thresholds.rs"];
 
 #[test]
@@ -81,13 +83,14 @@ fn only_thresholds_stands_beside_the_folders() {
     for entry in fs::read_dir(&root).expect("the folder is there") {
         let name = entry.expect("its entries can be read").file_name();
         let name = name.to_string_lossy();
-        assert!(BESIDE.contains(&&*name) || FLOORS.contains(&&*name), "{name} stands in no folder");
+        assert!(BESIDE.contains(&&*name) || FLOORS.contains(&&*name), "{name} is in no folder");
     }
     let thresholds = fs::read_to_string(root.join("thresholds.rs")).expect("a source can be read");
     assert!(thresholds.lines().all(|line| named(line).is_empty()), "the numbers that decide use a folder");
 }
 
-/// The code outside `effects/` that may name effects, and why. Facts about an effect belong into its file: ask its `Definition`.
+/// The code outside `effects/` that may name effects, and why. Facts about an effect belong into
+/// its file: ask its `Definition`.
 const MAY_NAME: [(&str, &str); 0] = [];
 
 /// The effects, as the code names them: `stribeck_friction` is `StribeckFriction`.
@@ -118,7 +121,7 @@ fn names_effect(line: &str, aliases: &[String], variants: &[String]) -> bool {
     code.match_indices("::").any(|(place, _)| {
         let before = code[..place].rsplit(|c| !is_word(c)).next().unwrap_or("");
         let after = code[place + 2..].split(|c| !is_word(c)).next().unwrap_or("");
-        // Nothing but names stands in a list or in a star.
+        // A list or a star holds nothing but names.
         let is_effect = variants.iter().any(|variant| variant == after) || after.is_empty();
         aliases.iter().any(|alias| alias == before) && is_effect
     })
@@ -165,4 +168,105 @@ fn what_an_effect_is_stands_in_its_file() {
     for (file, why) in MAY_NAME {
         assert!(naming.iter().any(|(name, _)| name == file), "{file} names no effect, and need not ({why})");
     }
+}
+
+/// Words of other things that are spelled like a key of a shape, by file, and why. A value of an
+/// effect is asked of the effect: `Effect::turn`, or a method of its `Definition`.
+const OTHER_WORDS: [(&str, &[&str], &str); 8] = [
+    ("src/io/known_keys.rs", &["viscous", "weight", "limit", "turn"], "keys of a rig beside its effects"),
+    ("src/report/exports.rs", &["damping", "limit"], "keys of an exported joint"),
+    ("src/report/html.rs", &["speed"], "a variable of the motion"),
+    ("src/report/outcome.rs", &["speed", "viscous", "weight"], "a variable, and keys of a rig's model"),
+    ("src/validation/residual_maps.rs", &["speed"], "a variable of the motion"),
+    ("experiment/src/case.rs", &["speed"], "a limit of the input"),
+    ("experiment/src/write.rs", &["damping"], "a value of the servo"),
+    ("device-setup/src/compensate/coefficients.rs", &["viscous", "weight"], "coefficients"),
+];
+
+/// The keys of shapes, as the files of the effects declare them: by `shape!`, or by
+/// `ShapeKey::new`.
+fn shape_keys(text: &str) -> Vec<String> {
+    let mut keys = Vec::new();
+    let mut is_declaration = false;
+    for line in without_tests(text).0 {
+        let line = line.trim();
+        is_declaration = line == "shape! {" || is_declaration && line != "}" && !line.starts_with("impl");
+        let declared = line.split_once(": ").filter(|(_, rest)| is_declaration && rest.ends_with(','));
+        keys.extend(declared.map(|(key, _)| key.to_owned()));
+        let numbered = line.split_once("ShapeKey::new(\"").and_then(|(_, rest)| rest.split_once('"'));
+        keys.extend(numbered.map(|(key, _)| key.to_owned()));
+    }
+    keys
+}
+
+/// The keys that a line of code spells: a string that is one, or that begins with one of numbered
+/// ones.
+fn spelled<'a>(line: &str, keys: &'a [String]) -> Vec<&'a str> {
+    let code = line.split("//").next().unwrap_or("");
+    let strings: Vec<&str> = code.split('"').skip(1).step_by(2).collect();
+    let is = |key: &&String| {
+        strings.iter().any(|text| match text.strip_prefix(key.as_str()) {
+            Some("") => true,
+            Some(rest) => key.ends_with('_') && rest.starts_with(|c: char| c == '{' || c.is_ascii_digit()),
+            None => false,
+        })
+    };
+    keys.iter().filter(is).map(String::as_str).collect()
+}
+
+#[test]
+fn a_key_of_a_shape_is_spelled_in_effects_alone() {
+    let top = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut files = Vec::new();
+    sources(&top.join("src"), &mut files);
+    for below in ["experiment/src", "device-setup/src", "lab/src"] {
+        sources(&top.join("../host-sim").join(below), &mut files);
+    }
+    let text = |file: &PathBuf| fs::read_to_string(file).expect("a source can be read");
+    let tests: Vec<PathBuf> = files
+        .iter()
+        .flat_map(|file| without_tests(&text(file)).1.into_iter().map(|test| file.with_file_name(test)))
+        .collect();
+    let texts: Vec<(String, String)> = files
+        .iter()
+        .filter(|file| !tests.contains(file))
+        .map(|file| (file.strip_prefix(top).unwrap_or(file).display().to_string(), text(file)))
+        .collect();
+    let is_of_effects = |name: &str| name.starts_with("src/effects");
+    let mut keys: Vec<String> =
+        texts.iter().filter(|(name, _)| is_of_effects(name)).flat_map(|(_, text)| shape_keys(text)).collect();
+    keys.sort();
+    keys.dedup();
+    for known in ["turn", "order_", "per_command", "of_drive", "mean_square", "degree", "speed"] {
+        assert!(keys.iter().any(|key| key == known), "{known} was not seen: the reader of sources is blind");
+    }
+    let mut found = Vec::new();
+    for (name, text) in texts.iter().filter(|(name, _)| !is_of_effects(name)) {
+        for line in without_tests(text).0 {
+            found.extend(spelled(line, &keys).into_iter().map(|key| (name.as_str(), key, line.trim())));
+        }
+    }
+    let is_other = |file: &str, key: &str| {
+        OTHER_WORDS.iter().any(|(other, words, _)| file.ends_with(other) && words.contains(&key))
+    };
+    let wrong: Vec<String> = found
+        .iter()
+        .filter(|(file, key, _)| !is_other(file, key))
+        .map(|(file, key, line)| format!("{file}: {key}: {line}"))
+        .collect();
+    assert!(wrong.is_empty(), "code outside effects/ spells keys of shapes:\n{}", wrong.join("\n"));
+    for (file, words, why) in OTHER_WORDS {
+        for word in words {
+            let is_there = found.iter().any(|(name, key, _)| name.ends_with(file) && key == word);
+            assert!(is_there, "{file} does not spell {word} any more ({why})");
+        }
+    }
+}
+
+#[test]
+fn a_spelled_key_is_seen() {
+    let keys = ["turn".to_owned(), "order_".to_owned()];
+    assert_eq!(spelled("effect.shape.get(\"turn\")", &keys), ["turn"]);
+    assert_eq!(spelled("format!(\"order_{i}\") // \"turn\"", &keys), ["order_"]);
+    assert!(spelled("let turn = effect.turn(); f(\"turned\", \"order_s\")", &keys).is_empty());
 }

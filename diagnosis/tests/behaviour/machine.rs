@@ -1,4 +1,5 @@
-//! The small simulator's machine: an axis with one effect beyond inertia, viscous and dry friction, and what moves it.
+//! The small simulator's machine: an axis with one effect beyond inertia, viscous and dry friction,
+//! and what moves it.
 
 use std::collections::VecDeque;
 use std::f64::consts::TAU;
@@ -33,7 +34,8 @@ pub const COUNTS: f64 = 636.619_772_4;
 /// Force at which a grip of size 1 lets go, N·m.
 pub const GRIP: f64 = 7e-4;
 
-/// Square of the command under which a gain that falls with the copper loss settles at its full change, A².
+/// Square of the command under which a gain that falls with the copper loss settles at its full
+/// change, A².
 pub const WARM_SQUARE: f64 = 1e-3;
 
 /// The plant's physics beyond the nominal model.

@@ -1,5 +1,6 @@
-//! Faults of naming that recordings of real machines and a second generator showed, each on a small simulated machine: names given
-//! where another cause, wrong values or chance were there, and what was said instead.
+//! Faults of naming that recordings of real machines and a second generator showed, each on a small
+//! simulated machine: names given where another cause, wrong values or chance were there, and what
+//! was said instead.
 
 use crate::axis::{self, AXIS, BENCH, Machine, Taken, WHOLE, diagnosed, mixed, names, rig};
 use crate::common::{self, Setup, WARM_SQUARE};
@@ -93,7 +94,8 @@ fn a_gravity_that_is_missing_is_no_unit_that_is_off() {
     assert!(outcome.report.effects[0].class.contains(&N::MassImbalance), "{}", outcome.report.sentence);
 }
 
-/// A command that answers the noise of the encoder lets regressors that know the future take it for an effect.
+/// A command that answers the noise of the encoder lets regressors that know the future take it for
+/// an effect.
 #[test]
 fn under_feedback_no_effect_predicts_a_nulls_residual() {
     no_effect_gains_on_a_null(&[5]);

@@ -1,5 +1,5 @@
-//! The diagnosis on recordings of real machines, where they are at hand. They are not part of the project: where they are
-//! absent these tests say so and check nothing.
+//! The diagnosis on recordings of real machines, where they are at hand. They are not part of the
+//! project: where they are absent these tests say so and check nothing.
 
 use diagnosis::effects::EffectName;
 use diagnosis::recording::Recording;
@@ -51,7 +51,8 @@ fn emps_names_dry_friction_then_direction_or_did_not_run() {
     }
 }
 
-/// The ripple of the ball screw is there (it gains hundreds of nats on the held-out recording) but takes less than 5 % off the force error.
+/// The ripple of the ball screw is there (it gains hundreds of nats on the held-out recording) but
+/// takes less than 5 % off the force error.
 #[test]
 fn emps_ripple_is_seen_but_not_material_or_did_not_run() {
     let Some(dir) = shared("emps") else { return };

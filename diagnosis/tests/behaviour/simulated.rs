@@ -1,4 +1,5 @@
-//! Verdicts on recordings of a small simulator: nulls, wrong values, disturbance, effects, and input that cannot tell.
+//! Verdicts on recordings of a small simulator: nulls, wrong values, disturbance, effects, and
+//! input that cannot tell.
 
 use crate::common::{self, Setup, record, rig};
 use diagnosis::effects::EffectName;
@@ -113,7 +114,8 @@ fn bristles_of_one_length_and_of_many_are_distinguished() {
 
 #[test]
 fn roller_slip_is_found_although_the_rig_is_wrong() {
-    // Its law stands on the machine and on a force that is there all the time, another one in each recording.
+    // Its law is built on the machine and on a force that is there all the time, another one in
+    // each recording.
     let outcome = run(&rig(OFF, OFFSET), &setup("grip"));
     let names: Vec<&str> = outcome.report.effects.iter().map(|e| e.name.as_str()).collect();
     assert_eq!(names, ["roller_slip"], "{}", outcome.summary());
@@ -125,7 +127,8 @@ fn roller_slip_is_found_although_the_rig_is_wrong() {
 
 #[test]
 fn dry_and_asymmetric_friction_are_named_together() {
-    // Neither carries to the held-out recording without the other, and a preloaded spring is no friction.
+    // Neither carries to the held-out recording without the other, and a preloaded spring is no
+    // friction.
     let mut rig = rig(OFF, "");
     rig.model.coulomb = None;
     for closed in [false, true] {
@@ -175,8 +178,8 @@ fn a_load_step_is_no_drift_and_the_report_names_its_likeness() {
         let outcome = run(&rig(OFF, OFFSET), &Setup { closed, size: 0.2, ..setup("heavier_load") });
         assert!(outcome.report.effects.is_empty(), "{}", outcome.summary());
         assert_eq!(outcome.report.verdict, Verdict::Unexplained, "{}", outcome.summary());
-        // In open loop it is told by its time or, where no drift replaces it, by its inputs; under a loop gain and friction
-        // are both seen to change, alike.
+        // In open loop it is reported by its time or, where no drift replaces it, by its inputs;
+        // under a loop gain and friction are both seen to change, alike.
         let told = &outcome.report.sentence;
         let is_told = told.contains("at once, at 5.4 s")
             || told.contains("a part of the command's force that falls as time grows");
@@ -194,14 +197,14 @@ fn a_lossy_gear_is_no_effect_of_the_library() {
             let outcome = run(&rig(OFF, OFFSET), &Setup { closed, size, seed, ..setup("gear_loss") });
             assert!(outcome.report.effects.is_empty(), "{}", outcome.summary());
             assert_eq!(outcome.report.verdict, Verdict::Unexplained, "{}", outcome.summary());
-            // Where nothing like it is found first, it is told by its inputs alone.
+            // Where nothing like it is found first, it is reported by its inputs alone.
             let told = outcome.report.sentence;
             let is_gear = told.contains("as a gear loses it") && told.contains(why);
             assert!(is_gear || told.contains("a force that swings with command"), "{told}");
             as_gear += u32::from(is_gear);
         }
     }
-    assert!(as_gear >= 4, "{as_gear} of 6 are told as a gear's");
+    assert!(as_gear >= 4, "{as_gear} of 6 are reported as a gear's");
 }
 
 #[test]

@@ -1,4 +1,5 @@
-//! Recordings whose command and reading are up to a row apart, or that were integrated by Euler's method: no effect is missing.
+//! Recordings whose command and reading are up to a row apart, or that were integrated by Euler's
+//! method: no effect is missing.
 
 use crate::axis::{AXIS, BENCH, Machine, WHOLE, diagnosed, mixed, names, record, rig};
 use diagnosis::Outcome;
@@ -23,7 +24,8 @@ fn a_command_part_of_a_row_early_or_late_is_no_effect() {
 
 #[test]
 fn a_delay_of_rows_is_an_effect_of_its_whole_length() {
-    // The longer one leaves most at the command's fastest tone, which is no force that swings by itself.
+    // The longer one leaves most at the command's fastest tone, which is no force that swings by
+    // itself.
     for rows in [4.0, 12.0] {
         let outcome = late_by(rows);
         assert_eq!(names(&outcome), [N::CommandDelay], "{rows} rows");
@@ -32,7 +34,8 @@ fn a_delay_of_rows_is_an_effect_of_its_whole_length() {
     }
 }
 
-/// The bench's machine integrated with one step a row; `new` steps with the speed after the step, as most simulators do.
+/// The bench's machine integrated with one step a row; `new` steps with the speed after the step,
+/// as most simulators do.
 fn by_euler(new: bool, seed: u64) -> Recording {
     let command = mixed(20.0, seed as f64);
     let (mut q, mut v) = (0.0, 0.0_f64);

@@ -1,4 +1,5 @@
-//! Mistakes that people make with units, signs, columns and files: each gets the sentence that helps, and none a name.
+//! Mistakes that people make with units, signs, columns and files: each gets the sentence that
+//! helps, and none a name.
 
 use diagnosis::effects::EffectName;
 use diagnosis::recording::Recording;
@@ -98,7 +99,7 @@ fn every_effect_of_the_library_is_tested_or_said_not_to_be() {
         assert_eq!(
             u8::from(is_of_rig) + u8::from(is_named || is_tested) + u8::from(is_untested),
             1,
-            "{name} stands in one list: {}",
+            "{name} is in one list: {}",
             report.sentence
         );
     }

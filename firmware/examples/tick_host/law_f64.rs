@@ -1,6 +1,6 @@
-//! The law of Paper 001 that `tick_host` runs, in `f64`: speed, layers, walls, friction in a cone, limits of torque, converter.
-//! Written from the equations, as the tests' twin is. It has no observer of passivity and none of the watches (dead encoder,
-//! runaway, silent PC).
+//! The law of Paper 001 that `tick_host` runs, in `f64`: speed, layers, walls, friction in a cone,
+//! limits of torque, converter. Written from the equations, as the tests' twin is. It has no
+//! observer of passivity and none of the watches (dead encoder, runaway, silent PC).
 
 use control_core::Config;
 use control_core::config::{FrictionLaw, Law, Parabola};
@@ -145,7 +145,8 @@ impl LawF64 {
         (self.mid_scale + steps) as u16
     }
 
-    /// Falls from the torque limit to the continuous torque over the last fifth of the heat that is allowed.
+    /// Falls from the torque limit to the continuous torque over the last fifth of the heat that is
+    /// allowed.
     fn allowed(&self) -> f64 {
         let allowed = self.continuous * self.continuous;
         let share = ((allowed - self.heat) * 5.0 / allowed).clamp(0.0, 1.0);
@@ -183,7 +184,8 @@ impl LawF64 {
         }
     }
 
-    /// The extra depth of layer `next` where the tip comes to it, and the tip's place when the last wall gave way.
+    /// The extra depth of layer `next` where the tip comes to it, and the tip's place when the last
+    /// wall gave way.
     fn carried_along(&self, next: usize) -> (f64, f64) {
         let last = self.layers.iter().rev().find(|layer| layer.open);
         let Some(Layer { wall: Some(wall), top, carried, .. }) = last else { return (0.0, f64::MIN) };

@@ -1,6 +1,7 @@
-//! Measures a tick of the control law on this PC: `cargo run --release -p firmware --example tick_host`. Prints
-//! `tick_host_ns=…`, the median over runs of a second each of an insertion and withdrawal over and over, and by turns with it,
-//! as its peer, the same law in `f64`, which must ask the converter for the same codes.
+//! Measures a tick of the control law on this PC: `cargo run --release -p firmware --example
+//! tick_host`. Prints `tick_host_ns=…`, the median over runs of a second each of an insertion and
+//! withdrawal over and over, and by turns with it, as its peer, the same law in `f64`, which must
+//! ask the converter for the same codes.
 
 mod law_f64;
 

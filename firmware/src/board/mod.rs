@@ -1,6 +1,7 @@
-//! The boards, a folder each, chosen by a feature of the crate of the same name (`build.rs` refuses none and two). A folder says
-//! which pin does what, where the clock comes from and what its ceilings are, and holds the board's `memory.x` where that is not the
-//! one at the top of the repository. Only the folders name pins.
+//! The boards, a folder each, chosen by a feature of the crate of the same name (`build.rs` refuses
+//! none and two). A folder says which pin does what, where the clock comes from and what its
+//! ceilings are, and holds the board's `memory.x` where that is not the one at the top of the
+//! repository. Only the folders name pins.
 
 #[cfg(feature = "discovery")]
 mod discovery;

@@ -1,26 +1,27 @@
-//! The brown-out reset, which a part from the factory has switched off. Below 2.66 V the torque goes off; without this reset nothing
-//! would stop a core whose supply goes on falling.
+//! The brown-out reset, which a part from the factory has switched off. Below 2.66 V the torque
+//! goes off; without this reset nothing would stop a core whose supply goes on falling.
 
 use stm32f4xx_hal::pac::flash::RegisterBlock;
 
-/// Values of `BOR_LEV` (RM0090 3.9.10): the smaller, the higher the threshold. The register crate names them the other way round
-/// (its "level 2" is the manual's level 1), so they are given as numbers here.
+/// Values of `BOR_LEV` (RM0090 3.9.10): the smaller, the higher the threshold. The register crate
+/// names them the other way round (its "level 2" is the manual's level 1), so they are given as
+/// numbers here.
 const LEVEL_3: u8 = 0b00;
 const LEVEL_2: u8 = 0b01;
 const KEYS: [u32; 2] = [0x0819_2A3B, 0x4C5D_6E7F];
-/// Turns of a loop that reads a register: option bytes take as long as an erasure of the shortest sector (data sheet: 0.8 s at
-/// most).
+/// Turns of a loop that reads a register: option bytes take as long as an erasure of the shortest
+/// sector (data sheet: 0.8 s at most).
 const TURNS: u32 = 100_000_000;
 
-/// Returns true if the part resets itself before its supply is too low for what the firmware asks of it: at level 2, 2.4 to 2.5 V
-/// on the way down (data sheet, BOR thresholds), or at level 3.
+/// Returns true if the part resets itself before its supply is too low for what the firmware asks
+/// of it: at level 2, 2.4 to 2.5 V on the way down (data sheet, BOR thresholds), or at level 3.
 pub(super) fn is_on(flash: &RegisterBlock) -> bool {
     let level = flash.optcr().read().bor_lev().bits();
     level == LEVEL_2 || level == LEVEL_3
 }
 
-/// Sets level 2 if it is off (RM0090 3.7.2); the other option bytes stay. Level 3 would reset a board whose rail is a diode below
-/// 3.3 V.
+/// Sets level 2 if it is off (RM0090 3.7.2); the other option bytes stay. Level 3 would reset a
+/// board whose rail is a diode below 3.3 V.
 pub(super) fn set(flash: &RegisterBlock) {
     if is_on(flash) {
         return;

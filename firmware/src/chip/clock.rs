@@ -17,8 +17,9 @@ pub(crate) enum Source {
     Bypass,
 }
 
-/// Waits for the clock from outside and runs on it, as fast as `timing` says: the 168 MHz that every part of the family reaches
-/// without over-drive, at the regulator's scale 1 of reset (RM0090 5.1.4).
+/// Waits for the clock from outside and runs on it, as fast as `timing` says: the 168 MHz that
+/// every part of the family reaches without over-drive, at the regulator's scale 1 of reset (RM0090
+/// 5.1.4).
 pub(super) fn start(rcc: RCC, source: Source) -> Rcc {
     wait_for(&rcc, source);
     let config = Config::hse(timing::EXTERNAL_CLOCK_HZ.Hz())
@@ -35,22 +36,25 @@ pub(super) fn start(rcc: RCC, source: Source) -> Rcc {
     rcc
 }
 
-/// Has the flash wait for as long as the lowest supply needs that the brown-out reset lets the core run on, 2.4 V: 6 wait states
-/// at 168 MHz (RM0090 3.5.1). The first revision of the STM32F40x does not prefetch (its errata sheet; ST's own start-up code asks
-/// for the revision too).
+/// Has the flash wait for as long as the lowest supply needs that the brown-out reset lets the core
+/// run on, 2.4 V: 6 wait states at 168 MHz (RM0090 3.5.1). The first revision of the STM32F40x does
+/// not prefetch (its errata sheet; ST's own start-up code asks for the revision too).
 fn wait_for_flash() {
     const FIRST_REVISION: u16 = 0x1000;
-    // The first revision gives itself out as an STM32F2 (errata sheet, "MCU device ID is incorrect").
+    // The first revision gives itself out as an STM32F2 (errata sheet, "MCU device ID is
+    // incorrect").
     const DEVICE_OF_FIRST_REVISION: u16 = 0x411;
-    // SAFETY: start-up has the part to itself; the HAL is done with the register, and the identity is only read.
+    // SAFETY: start-up has the part to itself; the HAL is done with the register, and the identity
+    // is only read.
     let (flash, identity) = unsafe { (&*FLASH::ptr(), (&*DBGMCU::ptr()).idcode().read()) };
     let is_first =
         identity.rev_id().bits() == FIRST_REVISION || identity.dev_id().bits() == DEVICE_OF_FIRST_REVISION;
     flash.acr().modify(|_, w| w.latency().ws6().prften().bit(!is_first));
 }
 
-/// Has the clock security watch the clock from outside once it runs. One that never comes leaves the device here, its pins inputs
-/// and the amplifier held off by its pull-down, until a person looks: without it there is neither USB nor a tick.
+/// Has the clock security watch the clock from outside once it runs. One that never comes leaves
+/// the device here, its pins inputs and the amplifier held off by its pull-down, until a person
+/// looks: without it there is neither USB nor a tick.
 fn wait_for(rcc: &RCC, source: Source) {
     // The bypass can be chosen only while the oscillator is off (RM0090 7.3.1).
     rcc.cr().modify(|_, w| w.hsebyp().bit(source == Source::Bypass));

@@ -15,8 +15,8 @@ use stm32f4xx_hal::rcc::Rcc;
 /// TIM2 in encoder mode.
 pub(crate) struct Encoder(Qei<TIM2>);
 
-/// Counts on both edges of both lines (RM0090 18.3.12), each filtered and pulled up: `a` and `b` are inputs, pulled up. `supply` is high
-/// while the encoder's supply is there, where it is wired.
+/// Counts on both edges of both lines (RM0090 18.3.12), each filtered and pulled up: `a` and `b`
+/// are inputs, pulled up. `supply` is high while the encoder's supply is there, where it is wired.
 pub(crate) fn init<A, B, const P: char, const N: u8>(
     timer: TIM2,
     (a, b): (A, B),

@@ -11,8 +11,9 @@ use stm32f4xx_hal::pac::{FLASH, IWDG, RCC};
 
 /// Bytes of a sector.
 const SECTOR_BYTES: usize = 128 * 1024;
-/// The configuration's first sector by its number (RM0090 3.3); the second one follows. Parts with two megabytes have the same twelve
-/// sectors in their first bank (3.4); those of the second bank, which begin at 16 in `SNB` (3.9.8), are left alone.
+/// The configuration's first sector by its number (RM0090 3.3); the second one follows. Parts with
+/// two megabytes have the same twelve sectors in their first bank (3.4); those of the second bank,
+/// which begin at 16 in `SNB` (3.9.8), are left alone.
 const FIRST_SECTOR: u8 = 10;
 const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
 
@@ -29,8 +30,8 @@ impl Sectors {
         Self { flash, below: 0 }
     }
 
-    /// Sectors 8 and 9 instead, which hold nothing: an image ends far below. For the test of the board, which leaves the
-    /// configuration alone.
+    /// Sectors 8 and 9 instead, which hold nothing: an image ends far below. For the test of the
+    /// board, which leaves the configuration alone.
     #[allow(dead_code, reason = "the tests of the board call it")]
     pub(crate) fn scratch(self) -> Self {
         Self { below: 2, ..self }
@@ -72,9 +73,9 @@ impl Sectors {
         let sector = FIRST_SECTOR - self.below + sector;
         watchdog(PATIENT);
         let done = self.operate(timing::FLASH_ERASE_TURNS, |flash| {
-            // A register written whole begins from its reset value, which locks it (RM0090 3.9.7): whatever came after
-            // would be lost without a word.
-            // SAFETY: both numbers are sectors of this microcontroller, and no code lies in them.
+            // A register written whole begins from its reset value, which locks it (RM0090 3.9.7):
+            // whatever came after would be lost without a word. SAFETY: both numbers are sectors of
+            // this microcontroller, and no code is in them.
             flash.cr().write(|w| unsafe {
                 w.lock().clear_bit().psize().psize16().ser().set_bit().snb().bits(sector)
             });
@@ -87,8 +88,8 @@ impl Sectors {
         done
     }
 
-    /// Empties both caches, each of which has to be off for that (FLASH_ACR, RM0090 3.9.1): the next code comes from the flash, as it does
-    /// where other tasks have used the cache since.
+    /// Empties both caches, each of which has to be off for that (FLASH_ACR, RM0090 3.9.1): the
+    /// next code comes from the flash, as it does where other tasks have used the cache since.
     #[allow(dead_code, reason = "the tests of the board call it")]
     pub(crate) fn forget_code(&mut self) {
         self.flash.acr().modify(|_, w| w.icen().clear_bit());
@@ -107,22 +108,26 @@ impl Sectors {
     }
 }
 
-/// A time of the independent watchdog: the code of its prescaler, the divider that it stands for, and ms.
+/// A time of the independent watchdog: the code of its prescaler, the divider that it stands for,
+/// and ms.
 type WatchdogTime = (u8, u32, u32);
 /// While the flash is written word by word, and always else.
 const ALERT: WatchdogTime = (0b000, 4, timing::WATCHDOG_MS);
 /// While a sector is erased.
 const PATIENT: WatchdogTime = (0b100, 64, timing::WATCHDOG_ERASE_MS);
 
-/// Gives the independent watchdog another time and feeds it. Its registers cross into the domain of its slow clock, which
-/// takes five cycles of it; until then they take no other value (RM0090 21.4.4).
+/// Gives the independent watchdog another time and feeds it. Its registers cross into the domain of
+/// its slow clock, which takes five cycles of it; until then they take no other value (RM0090
+/// 21.4.4).
 fn watchdog((prescaler, divider, ms): WatchdogTime) {
     const OPEN: u16 = 0x5555;
     const FEED: u16 = 0xAAAA;
     const SLOW_CLOCK_KHZ: u32 = 32;
-    // SAFETY: two reads, and writes to registers that the watchdog's owner, who only feeds it, leaves alone.
+    // SAFETY: two reads, and writes to registers that the watchdog's owner, who only feeds it,
+    // leaves alone.
     let (iwdg, rcc) = unsafe { (&*IWDG::ptr(), &*RCC::ptr()) };
-    // Before the watchdog is started there is nothing to change: its clock runs from then on (RM0090 7.2.9).
+    // Before the watchdog is started there is nothing to change: its clock runs from then on
+    // (RM0090 7.2.9).
     if rcc.csr().read().lsirdy().bit_is_clear() {
         return;
     }
@@ -150,7 +155,7 @@ impl ReadNorFlash for Sectors {
     fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), NorFlashErrorKind> {
         check_read(self, offset, bytes.len())?;
         for (at, place) in (offset..).step_by(4).zip(bytes.chunks_exact_mut(4)) {
-            // SAFETY: an aligned word of flash, within the two sectors, that no variable lies in.
+            // SAFETY: an aligned word of flash, within the two sectors, which hold no variable.
             let word = unsafe { self.address(at).cast::<u32>().read_volatile() };
             place.copy_from_slice(&word.to_le_bytes());
         }
@@ -172,10 +177,11 @@ impl NorFlash for Sectors {
             let address = self.address(at).cast::<u16>();
             let half = half.iter().rev().fold(0, |half, &byte| half << 8 | u16::from(byte));
             self.operate(timing::FLASH_WORD_TURNS, |flash| {
-                // A register written whole begins from its reset value, which locks. 16 bits at a time: 32 ask for 2.7 V, and
-                // the rail may be lower (RM0090 3.6.2).
+                // A register written whole begins from its reset value, which locks. 16 bits at a
+                // time: 32 ask for 2.7 V, and the rail may be lower (RM0090 3.6.2).
                 flash.cr().write(|w| w.lock().clear_bit().psize().psize16().pg().set_bit());
-                // SAFETY: an aligned half of a word of flash, within the two sectors, that no variable lies in, open for programming.
+                // SAFETY: an aligned half of a word of flash, within the two sectors, which hold no
+                // variable, open for programming.
                 unsafe { address.write_volatile(half) };
                 cortex_m::asm::dsb();
             })?;

@@ -3,7 +3,8 @@
 use firmware::port;
 use stm32f4xx_hal::gpio::{self, AnyPin, Output, PinState};
 
-/// A lamp for torque and one for a fault; a third, which the board lights by itself, says that the image runs.
+/// A lamp for torque and one for a fault; a third, which the board lights by itself, says that the
+/// image runs.
 pub(crate) struct Lamps {
     powered: AnyPin<Output>,
     fault: AnyPin<Output>,

@@ -1,6 +1,7 @@
-//! The microcontroller: STM32F405/407 and STM32F42x/43x, one family under one manual, RM0090. Everything that its boards have in
-//! common is here; which pin does what is the board's (`crate::board`), but for pins that leave no choice: PA4 is the converter's
-//! output, PA11 and PA12 are USB.
+//! The microcontroller: STM32F405/407 and STM32F42x/43x, one family under one manual, RM0090.
+//! Everything that its boards have in common is here; which pin does what is the board's
+//! (`crate::board`), but for pins that leave no choice: PA4 is the converter's output, PA11 and
+//! PA12 are USB.
 //!
 //! Nothing here may name a board.
 
@@ -37,7 +38,8 @@ use firmware::store::Nor;
 use firmware::tilt::TiltSource;
 use stm32f4xx_hal::pac::{Interrupt, Peripherals};
 
-/// The properties of a board with this microcontroller. The rest of [`Board`] is the microcontroller's.
+/// The properties of a board with this microcontroller. The rest of [`Board`] is the
+/// microcontroller's.
 pub(crate) trait Wiring: 'static {
     /// The amplifier's enable line: its pin.
     type Enable: OutputPin + Placed;

@@ -1,4 +1,5 @@
-//! The lines on which the amplifier and the emergency stop speak back, and the motor's current where it is measured.
+//! The lines on which the amplifier and the emergency stop speak back, and the motor's current
+//! where it is measured.
 #![allow(unsafe_code, reason = "the HAL waits for a conversion; here one runs all the time and is only read")]
 
 use super::pin::Pin;
@@ -10,7 +11,8 @@ use stm32f4xx_hal::hal_02::adc::Channel;
 use stm32f4xx_hal::pac::{ADC_COMMON, ADC2};
 use stm32f4xx_hal::rcc::{Enable, Rcc};
 
-/// A line that a contact outside connects to the board's supply, pulled down: a wire that is off or shorted to ground reads low.
+/// A line that a contact outside connects to the board's supply, pulled down: a wire that is off or
+/// shorted to ground reads low.
 pub(crate) struct Line(AnyPin<Input>);
 
 impl Line {
@@ -34,8 +36,8 @@ pub(crate) struct DriveLines {
 }
 
 impl DriveLines {
-    /// `fitted` is closed where the current is measured, on `channel`. A wire that is off says stop, not ready, not fitted. The
-    /// `enable` line is read back.
+    /// `fitted` is closed where the current is measured, on `channel`. A wire that is off says
+    /// stop, not ready, not fitted. The `enable` line is read back.
     pub(crate) fn new(
         [stop, ready, fitted]: [Line; 3],
         enable: Pin,
@@ -65,8 +67,8 @@ fn convert_for_ever<C: Channel<ADC2, ID = u8>>(converter: ADC2, _channel: C, rcc
     const SAMPLING: u8 = 0b100;
     let channel = C::channel();
     ADC2::enable(rcc);
-    // SAFETY: the prescaler that the HAL sets too; both converters run on it. 84 MHz by 4, for more than 36 MHz is too
-    // fast (data sheet, ADC characteristics).
+    // SAFETY: the prescaler that the HAL sets too; both converters run on it. 84 MHz by 4, for more
+    // than 36 MHz is too fast (data sheet, ADC characteristics).
     unsafe { &*ADC_COMMON::ptr() }.ccr().modify(|_, w| w.adcpre().div4());
     // SAFETY: a time of the manual, for a channel that there is.
     match channel {

@@ -15,13 +15,15 @@ use stm32f4xx_hal::pac::{ADC1, DAC, GPIOE};
 use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::rcc::Rcc;
 
-/// The microcontroller's own converter, channel 1. It takes a code at the instant that the tick's timer sets (TRGO), so
-/// that the motor is driven at equal distances, however long the tick took to compute.
+/// The microcontroller's own converter, channel 1. It takes a code at the instant that the tick's
+/// timer sets (TRGO), so that the motor is driven at equal distances, however long the tick took to
+/// compute.
 pub(crate) struct OnChipDac(C1);
 
 impl OnChipDac {
-    /// At zero torque from the first moment that it is on. The buffer is off: it would end 0.2 V from either rail (DS8626,
-    /// DAC characteristics), where full torque is; a follower stands outside (`docs/hardware.md`).
+    /// At zero torque from the first moment that it is on. The buffer is off: it would end 0.2 V
+    /// from either rail (DS8626, DAC characteristics), where full torque is; a follower is outside
+    /// (`docs/hardware.md`).
     pub(crate) fn new(mut channel: C1) -> Self {
         // SAFETY: `C1` stands for channel 1, whose bits alone are changed; channel 2 is not used.
         let control = unsafe { &*DAC::ptr() }.cr();
@@ -30,7 +32,8 @@ impl OnChipDac {
         let mid_scale = DacWidth::BITS_12.mid_scale();
         channel.set_value(mid_scale);
         control.modify(|_, w| w.en1().set_bit());
-        // 14.3.4: without a trigger the code is at the pin one bus clock later; from then on codes wait for the timer.
+        // 14.3.4: without a trigger the code is at the pin one bus clock later; from then on codes
+        // wait for the timer.
         channel.set_value(mid_scale);
         control.modify(|_, w| w.ten1().set_bit());
         Self(channel)
@@ -47,7 +50,8 @@ impl MotorDac for OnChipDac {
 
 type LinePins = (PE8, PE9, PE10, PE11, PE12, PE13, PE14, PE15);
 
-/// Eight lines of port E, set in one write: the same on every board, for both have this half of a port free on one header.
+/// Eight lines of port E, set in one write: the same on every board, for both have this half of a
+/// port free on one header.
 pub(crate) struct Lines(OutPort8<'E', 8, 9, 10, 11, 12, 13, 14, 15>);
 
 impl Lines {
@@ -80,7 +84,8 @@ pub(super) fn dac_to_zero_torque() {
     let mid_scale = DacWidth::BITS_12.mid_scale().into();
     // SAFETY: valid codes and bits; whoever owned the converter never runs again.
     unsafe {
-        // Off and on again, now without its trigger (RM0090 14.3.6): a code then goes straight out (14.3.4).
+        // Off and on again, now without its trigger (RM0090 14.3.6): a code then goes straight out
+        // (14.3.4).
         (*DAC::ptr()).cr().write(|w| w.boff1().set_bit());
         (*DAC::ptr()).dhr12r1().write(|w| w.bits(mid_scale));
         (*DAC::ptr()).cr().write(|w| w.boff1().set_bit().en1().set_bit());
@@ -90,10 +95,12 @@ pub(super) fn dac_to_zero_torque() {
 
 impl ByteBus for Lines {
     fn put(&mut self, byte: u8) {
-        // Of port E's upper half: what is to rise in the lower word, what is to fall in the upper one.
+        // Of port E's upper half: what is to rise in the lower word, what is to fall in the upper
+        // one.
         let word = u32::from(byte) << 8 | u32::from(!byte) << 24;
-        // SAFETY: writes to this register change the lines named in it and no other, and those eight belong to `self`.
-        // The HAL puts the same word together line by line, in fifty instructions of the tick.
+        // SAFETY: writes to this register change the lines named in it and no other, and those
+        // eight belong to `self`. The HAL puts the same word together line by line, in fifty
+        // instructions of the tick.
         unsafe { &*GPIOE::ptr() }.bsrr().write(|w| unsafe { w.bits(word) });
     }
 }
@@ -107,7 +114,8 @@ pub(crate) struct InclinometerPin<P> {
 impl<P: Channel<ADC1, ID = u8>> InclinometerPin<P> {
     /// On ADC 1.
     pub(crate) fn new(adc: ADC1, pin: P, rcc: &mut Rcc) -> Self {
-        // 84 MHz by 4: by 2, as the HAL would have it, is more than the converter's 36 MHz (data sheet, ADC characteristics).
+        // 84 MHz by 4: by 2, as the HAL would have it, is more than the converter's 36 MHz (data
+        // sheet, ADC characteristics).
         let config = AdcConfig::default().clock(Clock::Pclk2_div_4);
         Self { converter: Adc::new(adc, true, config, rcc), pin }
     }

@@ -1,4 +1,5 @@
-//! A pin by its registers, for what the HAL leaves out and for a crash, which may trust nobody who owns a pin.
+//! A pin by its registers, for what the HAL leaves out and for a crash, which may trust nobody who
+//! owns a pin.
 #![allow(unsafe_code, reason = "pins are reached past their owners")]
 
 use firmware::wire_check::Pull;
@@ -37,7 +38,8 @@ impl Pin {
         unsafe { &*self.registers() }.idr().read().bits() >> self.number & 1 != 0
     }
 
-    /// Pulls it, whatever else it does (RM0090 8.3.11). Nobody else changes the pulls of its port meanwhile.
+    /// Pulls it, whatever else it does (RM0090 8.3.11). Nobody else changes the pulls of its port
+    /// meanwhile.
     pub(crate) fn pull(self, pull: Pull) {
         let (place, pull) = (
             2 * self.number,
@@ -46,13 +48,15 @@ impl Pin {
                 Pull::Down => 0b10,
             },
         );
-        // SAFETY: two bits, of which these are values of the manual (RM0090 8.4.4); the others stay.
+        // SAFETY: two bits, of which these are values of the manual (RM0090 8.4.4); the others
+        // stay.
         unsafe { &*self.registers() }
             .pupdr()
             .modify(|r, w| unsafe { w.bits(r.bits() & !(0b11 << place) | pull << place) });
     }
 
-    /// Drives it low, where it is an output; else it does nothing. A write that changes no other pin.
+    /// Drives it low, where it is an output; else it does nothing. A write that changes no other
+    /// pin.
     pub(crate) fn set_low(self) {
         // SAFETY: a bit that clears this pin (RM0090 8.4.7).
         unsafe { &*self.registers() }.bsrr().write(|w| unsafe { w.bits(1 << (self.number + 16)) });

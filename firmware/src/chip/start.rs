@@ -1,5 +1,6 @@
-//! Start-up, in two halves with the board's between them: the clocks, then the board's pins, the amplifier first, then all that the
-//! microcontroller does by itself. Interrupts are masked meanwhile.
+//! Start-up, in two halves with the board's between them: the clocks, then the board's pins, the
+//! amplifier first, then all that the microcontroller does by itself. Interrupts are masked
+//! meanwhile.
 
 use super::brownout;
 use super::clock::{self, Source};
@@ -109,7 +110,8 @@ impl<W: Wiring> Parts<W> {
         let Begun { mut rcc, flags } = begun;
         core.DCB.enable_trace();
         core.DWT.enable_cycle_counter();
-        // Keeps the core's clock up in sleep: a debugger can read the log then, and the cycle counter counts on.
+        // Keeps the core's clock up in sleep: a debugger can read the log then, and the cycle
+        // counter counts on.
         own.debug.cr().modify(|_, w| w.dbg_sleep().set_bit());
 
         let Said { crash, torque, heat } = LAST_WORDS.take();
@@ -173,7 +175,8 @@ fn say(crash: &Crash) {
     );
 }
 
-/// The stored parts where they may run, else the default of the part that may not, and what is to be said of it.
+/// The stored parts where they may run, else the default of the part that may not, and what is to
+/// be said of it.
 fn plan(ceilings: &Ceilings, device: Stored<Device>, patient: Stored<Patient>) -> (Plan, Option<Fault>) {
     // The widest converter that there is: none is left of a record.
     let unknown = Device { dac: ceilings.converters[1], ..Device::default() };

@@ -7,8 +7,9 @@ use firmware::port;
 use stm32f4xx_hal::pac::{EXTI, FLASH, PWR};
 use stm32f4xx_hal::rcc::{Enable, Rcc};
 
-/// An interrupt, from line 16, when the supply falls below 2.66 V. A board's rail may be a diode below 3.3 V, 2.9 V where people
-/// have measured it on the Discovery: the thresholds above this one would never see it healthy.
+/// An interrupt, from line 16, when the supply falls below 2.66 V. A board's rail may be a diode
+/// below 3.3 V, 2.9 V where people have measured it on the Discovery: the thresholds above this one
+/// would never see it healthy.
 pub(super) fn warning(pwr: PWR, exti: EXTI, rcc: &mut Rcc) -> (Supply, SupplyLevel) {
     const FALLING_2V66: u8 = 4;
     PWR::enable(rcc);

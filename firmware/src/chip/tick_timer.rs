@@ -17,7 +17,8 @@ impl TickTimer {
         TIM4::reset(rcc);
         timer.psc().write(|w| w.psc().set(0));
         timer.arr().write(|w| w.arr().set((timing::TICK_TIMER_COUNTS - 1) as u16));
-        // Channel 1 falls with the edge and rises when the converter is to take its code; the converter listens.
+        // Channel 1 falls with the edge and rises when the converter is to take its code; the
+        // converter listens.
         let output_at = timing::OUTPUT_CYCLES / TIMER_CYCLES;
         timer.ccr1().write(|w| w.ccr().set(output_at as u16));
         timer.ccmr1_output().write(|w| w.oc1m().pwm_mode2());

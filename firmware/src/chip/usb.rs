@@ -13,16 +13,18 @@ use usbd_serial::{CdcAcmClass, USB_CLASS_CDC};
 /// The bus of this board.
 type Bus = UsbBus<USB>;
 
-/// The test identity of pid.codes. Its rule: anybody's, for tests in their own house, and never on a device that is handed on, sold or
-/// manufactured. Who does that asks pid.codes for a product number, free for open hardware, and writes it here and into the udev rule of
-/// `docs/hardware.md`. V-USB's shared 16C0:27DD is no alternative: its serial number has to begin with a domain or an address that its
-/// maker owns.
+/// The test identity of pid.codes. Its rule: anybody's, for tests in their own house, and never on
+/// a device that is handed on, sold or manufactured. Who does that asks pid.codes for a product
+/// number, free for open hardware, and writes it here and into the udev rule of `docs/hardware.md`.
+/// V-USB's shared 16C0:27DD is no alternative: its serial number has to begin with a domain or an
+/// address that its maker owns.
 const VENDOR_AND_PRODUCT: UsbVidPid = UsbVidPid(0x1209, 0x0001);
 const MANUFACTURER: &str = "Needle insertion simulator";
 const PRODUCT: &str = "Needle device";
 /// Largest packet of a bulk endpoint at full speed.
 const PACKET_BYTES: u16 = firmware::tasks::queues::PACKET_BYTES as u16;
-/// Words for the packets that wait to be read: the control endpoint's and the port's, with room to spare.
+/// Words for the packets that wait to be read: the control endpoint's and the port's, with room to
+/// spare.
 const RECEIVE_WORDS: usize = 64;
 const SERIAL_CHARACTERS: usize = 24;
 

@@ -3,7 +3,8 @@
 use super::{CELL_WORDS, ConfigFlash, Slot, StoreError};
 use embedded_storage::nor_flash::NorFlash;
 
-/// Any flash with the traits of `embedded-storage`: its first two sectors are the slots. It programs four bytes at a time, and no less.
+/// Any flash with the traits of `embedded-storage`: its first two sectors are the slots. It
+/// programs four bytes at a time, and no less.
 pub struct Nor<F>(pub F);
 
 impl<F: NorFlash> Nor<F> {

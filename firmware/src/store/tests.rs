@@ -1,4 +1,5 @@
-//! The power is cut at every single write and erasure; every single bit of a stored configuration is flipped.
+//! The power is cut at every single write and erasure; every single bit of a stored configuration
+//! is flipped.
 
 use super::*;
 use control_core::units::Millimetres;
@@ -80,14 +81,14 @@ impl ConfigFlash for &mut Flash {
     }
 }
 
-/// A device that is told from others by its travel.
+/// A device that is distinguished from others by its travel.
 fn device(travel: i16) -> Device {
     let mut device = Device::commissioned_virtual();
     device.limits.travel = Millimetres(travel.into());
     device
 }
 
-/// A patient who is told from others by where the outermost layer begins.
+/// A patient who is distinguished from others by where the outermost layer begins.
 fn patient(top: i16) -> Patient {
     let mut patient = Patient::default();
     patient.layers[0].depth = Millimetres(top.into());
@@ -140,8 +141,8 @@ fn a_full_slot_moves_over_while_it_is_in_use() {
     assert_eq!(load(&mut flash), Stored::Found(device(9 + 4 * CELLS as i16)));
 }
 
-/// From every fill of the slot: power lost in the middle of every write of saving, and in every write and erasure of the
-/// start that follows, which is then repeated.
+/// From every fill of the slot: power lost in the middle of every write of saving, and in every
+/// write and erasure of the start that follows, which is then repeated.
 #[test]
 fn losing_power_anywhere_leaves_the_old_or_the_new() {
     let mut cuts = 0;

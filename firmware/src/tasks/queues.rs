@@ -17,7 +17,8 @@ pub type Packet = Vec<u8, PACKET_BYTES>;
 pub struct Queued {
     /// The number of the session that it is from: only the PC that is there now is given torque.
     pub session: u8,
-    /// The order; `None`: the large one that waits, which is rare and only for a device whose torque is off.
+    /// The order; `None`: the large one that waits, which is rare and only for a device whose
+    /// torque is off.
     pub order: Option<Order>,
 }
 
@@ -77,7 +78,8 @@ pub struct TelemetryEnds {
 
 /// All ends.
 pub struct Ends {
-    /// The tick's, and its room for the excitations that play: out of the way of what every tick uses.
+    /// The tick's, and its room for the excitations that play: out of the way of what every tick
+    /// uses.
     pub tick: (TickEnds, &'static mut Segments),
     /// The USB task's.
     pub usb: UsbEnds,

@@ -20,8 +20,8 @@ pub struct Shared {
     pub trips: Trips,
     /// The causes that keep the device from being started.
     pub conditions: Conditions,
-    /// Which session's orders the tick carries out: those of a PC that went are none of the next one's. Written by
-    /// telemetry.
+    /// Which session's orders the tick carries out: those of a PC that went do not pass to the next
+    /// one. Written by telemetry.
     pub session: AtomicU8,
     /// Times of the stages.
     pub stages: Stages,
@@ -35,7 +35,8 @@ pub struct Shared {
     pub missed_ticks: AtomicU32,
     /// Codes that were written after the converter's instant. Written by the tick.
     pub late_codes: AtomicU32,
-    /// The state that the USB host has set: `LINK_CONFIGURED`, `LINK_READY`. Written by the USB task.
+    /// The state that the USB host has set: `LINK_CONFIGURED`, `LINK_READY`. Written by the USB
+    /// task.
     pub link: AtomicU8,
     /// Asks the USB task to throw away what waits for a PC that is gone. Set by telemetry.
     pub discard: AtomicBool,

@@ -1,5 +1,5 @@
-//! The supervisor: sets off the tasks that run by the clock, feeds the watchdog only while everybody reports, and decides
-//! what a debugger may stop.
+//! The supervisor: sets off the tasks that run by the clock, feeds the watchdog only while
+//! everybody reports, and decides what a debugger may stop.
 
 use super::shared::Shared;
 use crate::log;
@@ -83,8 +83,8 @@ impl<B: Board> Watch<B> {
                 }
             }
         }
-        // A debugger that halts the core stops the watchdog too, except while torque is on: then the watchdog ends the
-        // halt, and with it the torque, within its time.
+        // A debugger that halts the core stops the watchdog too, except while torque is on: then
+        // the watchdog ends the halt, and with it the torque, within its time.
         self.watchdog.stop_on_debug(!self.shared.is_powered());
         B::wake_usb();
         B::wake_telemetry();

@@ -1,5 +1,5 @@
-//! Telemetry: the device's end of the link between the USB queues and the tick's queues, and the configuration's way into
-//! flash. It decides nothing about torque; it only passes orders on.
+//! Telemetry: the device's end of the link between the USB queues and the tick's queues, and the
+//! configuration's way into flash. It decides nothing about torque; it only passes orders on.
 
 use super::queues::{Packet, Queued, TelemetryEnds};
 use super::shared::{LINK_CONFIGURED, LINK_READY, Shared};
@@ -45,8 +45,8 @@ pub struct Telemetry<B: Board> {
 }
 
 impl<B: Board> Telemetry<B> {
-    /// `plan` is the one that the tick starts with, `reset_cause` the fault that ended the last run, and `crash` the record that it
-    /// left where it gave up.
+    /// `plan` is the one that the tick starts with, `reset_cause` the fault that ended the last
+    /// run, and `crash` the record that it left where it gave up.
     pub fn new(
         shared: &'static Shared,
         (identity, plan, reset_cause, crash): (Identity, &Plan, Option<Fault>, Option<Crash>),
@@ -93,8 +93,8 @@ impl<B: Board> Telemetry<B> {
         let is_open = link & LINK_CONFIGURED != 0;
         if (self.was_open && !is_open) || was_closed {
             log::info!("the PC is gone");
-            // Nothing that it asked for outlives it: neither what has not been read yet, nor a start that the tick has not
-            // seen yet.
+            // Nothing that it asked for outlives it: neither what has not been read yet, nor a
+            // start that the tick has not seen yet.
             while self.ends.from_pc.dequeue().is_some() {}
             self.endpoint.disconnect();
             self.filling.clear();
@@ -126,7 +126,8 @@ impl<B: Board> Telemetry<B> {
         let in_session = self.endpoint.in_session();
         if in_session && !self.in_session {
             self.shared.stages.forget_longest();
-            // Ends whatever half frame the USB core still held from before; nothing else is in hand yet.
+            // Ends whatever half frame the USB core still held from before; nothing else is in hand
+            // yet.
             let _ = self.filling.push(FRAME_END);
         }
         self.in_session = in_session;
@@ -166,9 +167,9 @@ impl<B: Board> Telemetry<B> {
         }
     }
 
-    /// Each part outlives a reset; one that has not changed costs no flash. The link takes none while torque is on; a start
-    /// and a stop may still be on their way to the tick, though, and an erasure would stop the processor with the amplifier
-    /// on: not before it is off.
+    /// Each part outlives a reset; one that has not changed costs no flash. The link takes none
+    /// while torque is on; a start and a stop may still be on their way to the tick, though, and an
+    /// erasure would stop the processor with the amplifier on: not before it is off.
     fn save(&mut self, plan: &Plan) -> Result<(), TorqueIsOn> {
         self.shared.conditions.set(Interlock::Saving, true);
         let is_off = !self.shared.is_powered();

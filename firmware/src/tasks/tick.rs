@@ -19,7 +19,8 @@ use link::frames::Stage;
 const HEAT_TICKS: u32 = 8;
 
 /// The tick's own state.
-// In this order: the nearer a field is to the beginning, the fewer instructions it takes to reach it.
+// In this order: the nearer a field is to the beginning, the fewer instructions it takes to reach
+// it.
 #[repr(C)]
 pub struct Tick<B: Board> {
     shared: &'static Shared,
@@ -152,7 +153,8 @@ impl<B: Board> Tick<B> {
         interlock.is_none()
     }
 
-    /// Torque on, for the PC that is there and under no interlock; telemetry has refused it before where it could know.
+    /// Torque on, for the PC that is there and under no interlock; telemetry has refused it before
+    /// where it could know.
     fn power_up(&mut self, session: u8) {
         if session != self.shared.session.load(Relaxed) {
             return;
@@ -193,8 +195,9 @@ impl<B: Board> Tick<B> {
         self.shared.stages.note(Stage::Tick, B::cycles().wrapping_sub(entered));
     }
 
-    /// Counts a code that came after the converter's instant. One by itself is a delay of a tick; many make a wall softer than it
-    /// is calculated to be, so they are counted, sent to the PC and shown.
+    /// Counts a code that came after the converter's instant. One by itself is a delay of a tick;
+    /// many make a wall softer than it is calculated to be, so they are counted, sent to the PC and
+    /// shown.
     #[cold]
     #[inline(never)]
     fn late_code(&self) {
@@ -205,7 +208,8 @@ impl<B: Board> Tick<B> {
         self.shared.late_codes.store(self.shared.late_codes.load(Relaxed).saturating_add(1), Relaxed);
     }
 
-    /// Returns true while the flash is being written: an erasure stops the processor, and torque is off.
+    /// Returns true while the flash is being written: an erasure stops the processor, and torque is
+    /// off.
     fn is_saving(&self) -> bool {
         self.shared.conditions.get().contains(Interlock::Saving)
     }

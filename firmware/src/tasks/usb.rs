@@ -44,8 +44,9 @@ impl<B: Board> Port<B> {
 
     fn receive(&mut self) {
         if !self.ends.from_pc.ready() {
-            // The packet stays with the core, which makes the PC wait, and keeps its interrupt up: without this it would
-            // bring us back at once, and telemetry, which makes room, would never run.
+            // The packet stays with the core, which makes the PC wait, and keeps its interrupt up:
+            // without this it would bring us back at once, and telemetry, which makes room, would
+            // never run.
             B::allow_usb(false);
             return;
         }

@@ -1,6 +1,6 @@
-//! Both accelerometers that STM32F4DISCOVERY boards carry: LIS302DL (MB997B and before) and LIS3DSH (MB997C and later).
-//! They share connector, SPI mode and the place of the identity, and little else. Found by its identity, found again
-//! after it was gone.
+//! Both accelerometers that STM32F4DISCOVERY boards carry: LIS302DL (MB997B and before) and LIS3DSH
+//! (MB997C and later). They share connector, SPI mode and the place of the identity, and little
+//! else. Found by its identity, found again after it was gone.
 
 use super::{Acceleration, Reading, Smoother, TiltError, TiltSource, angle::below_horizontal};
 use crate::timing;
@@ -76,7 +76,8 @@ pub struct Accelerometer<D> {
 }
 
 impl<D: SpiDevice> Accelerometer<D> {
-    /// On `device`, a bus in SPI mode 3 with the sensor's select line, which may have other sensors on it too.
+    /// On `device`, a bus in SPI mode 3 with the sensor's select line, which may have other sensors
+    /// on it too.
     pub fn new(device: D) -> Self {
         Self { device, model: None, smoother: Smoother::default(), last: [0; 7], repeats: 0 }
     }
@@ -85,8 +86,9 @@ impl<D: SpiDevice> Accelerometer<D> {
         self.device.transfer_in_place(bytes).map_err(|_| TiltError::Absent)
     }
 
-    /// Looks for the sensor and sets it up if it has just appeared, or has forgotten what it was told: one that loses its power
-    /// alone comes back with its own registers, in power-down, under the identity that it had before.
+    /// Looks for the sensor and sets it up if it has just appeared, or has forgotten what it was
+    /// told: one that loses its power alone comes back with its own registers, in power-down, under
+    /// the identity that it had before.
     fn find(&mut self) -> Result<Model, TiltError> {
         let mut identity = [READ | WHO_AM_I, 0];
         self.transfer(&mut identity)?;

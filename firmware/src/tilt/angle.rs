@@ -1,5 +1,5 @@
-//! Angles without floating point: the tilt task may not use the floating-point unit, whose registers every interrupt would
-//! then have to save.
+//! Angles without floating point: the tilt task may not use the floating-point unit, whose
+//! registers every interrupt would then have to save.
 
 use super::Acceleration;
 use control_core::units::Milliradians;
@@ -9,8 +9,8 @@ const ARC_TANGENTS: [i32; 15] = [
     804_248, 474_774, 250_858, 127_340, 63_918, 31_989, 15_998, 7_999, 4_000, 2_000, 1_000, 500, 250, 125, 62,
 ];
 
-/// `atan2(y, x)` in mrad for `x ≥ 0`, |x| and |y| up to 16,383, by CORDIC in vectoring mode; within 1 mrad from a length
-/// of 100 on.
+/// `atan2(y, x)` in mrad for `x ≥ 0`, |x| and |y| up to 16,383, by CORDIC in vectoring mode; within
+/// 1 mrad from a length of 100 on.
 fn arc_tangent(y: i32, x: i32) -> Milliradians {
     // Sixteen more bits than the input: the shifts below lose none that matter.
     let (mut x, mut y) = (i64::from(x) << 16, i64::from(y) << 16);

@@ -10,7 +10,8 @@ pub trait ReadCode {
 
 /// Codes at level: half of the supply, to which such sensors are ratiometric.
 const LEVEL_CODE: i32 = 2048;
-/// Codes for 1 g: 0.66 V at 3.3 V, as after a divider of a sensor with 1 V/g at 5 V. A calibration value.
+/// Codes for 1 g: 0.66 V at 3.3 V, as after a divider of a sensor with 1 V/g at 5 V. A calibration
+/// value.
 const CODES_PER_G: i32 = 819;
 /// Beyond 1.2 g nothing at rest can be: a broken wire, a short circuit, or a hard blow.
 const LARGEST_CODES: i32 = CODES_PER_G * 6 / 5;

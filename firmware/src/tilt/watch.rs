@@ -1,4 +1,4 @@
-//! From single readings to the verdict that the sensor is broken: one bad transfer is none.
+//! From single readings to the verdict that the sensor is broken: one bad transfer is not enough.
 
 use super::TiltError;
 use crate::timing;

@@ -1,5 +1,6 @@
-//! From a recording to what the diagnosis reads: `rig.toml` and a CSV file for every stretch without a gap. The command is
-//! the converter's code less its mid-scale, so that `gain · command` is the motor's torque.
+//! From a recording to what the diagnosis reads: `rig.toml` and a CSV file for every stretch
+//! without a gap. The command is the converter's code less its mid-scale, so that `gain · command`
+//! is the motor's torque.
 
 use control_core::TICK_HZ;
 use device_sim::error::Error;

@@ -1,5 +1,6 @@
-//! Between recordings and the rig and CSV files that the diagnosis reads: [`export`] writes ours so, [`import`] reads those of
-//! other people, [`simulated`] puts a recording and its simulations into one MCAP file.
+//! Between recordings and the rig and CSV files that the diagnosis reads: [`export`] writes ours
+//! so, [`import`] reads those of other people, [`simulated`] puts a recording and its simulations
+//! into one MCAP file.
 
 pub mod export;
 pub mod import;

@@ -1,5 +1,5 @@
-//! A recording and what simulations make of it as one MCAP file, for Foxglove, Rerun and PlotJuggler: a topic for what was recorded,
-//! one for each model, and one for what each is off.
+//! A recording and what simulations make of it as one MCAP file, for Foxglove, Rerun and
+//! PlotJuggler: a topic for what was recorded, one for each model, and one for what each is off.
 
 use device_sim::error::Error;
 use diagnosis::simulation::comparison::Comparison;
@@ -12,7 +12,8 @@ use std::io::Cursor;
 /// Messages a second on a topic, at most.
 const RATE_HZ: f64 = 1000.0;
 
-/// Returns the file: `/recording`, and `/simulation/NAME` and `/residual/NAME` for each model. Times count from the first row.
+/// Returns the file: `/recording`, and `/simulation/NAME` and `/residual/NAME` for each model.
+/// Times count from the first row.
 pub fn mcap(compared: &Comparison) -> Result<Vec<u8>, Error> {
     written(compared)
         .map_err(|cause| Error::failed(format_args!("{}: no MCAP of it ({cause})", compared.file)))
@@ -43,7 +44,8 @@ fn written(compared: &Comparison) -> Result<Vec<u8>, McapError> {
         let (position, velocity, force) = (motion.position[row], motion.velocity[row], compared.force[row]);
         put(recording, position, velocity, force)?;
         for (model, (simulation, residual)) in compared.models.iter().zip(&models) {
-            // Started anew from the recorded state every few seconds where there is time for it: a free run says little.
+            // Started anew from the recorded state every few seconds where there is time for it: a
+            // free run says little.
             let near = model.afresh.as_ref().map_or(model.free.position[row], |positions| positions[row]);
             put(*simulation, near, model.free.velocity[row], model.force[row])?;
             put(*residual, position - near, velocity - model.free.velocity[row], force - model.force[row])?;

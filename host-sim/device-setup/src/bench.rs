@@ -1,4 +1,5 @@
-//! A conversation with a device that is being commissioned, one thing after the other: play this, watch that, take this part.
+//! A conversation with a device that is being commissioned, one thing after the other: play this,
+//! watch that, take this part.
 
 use crate::pause::pause;
 use control_core::controller::Sample;
@@ -74,7 +75,8 @@ impl<'a> Bench<'a> {
         Ok(bench)
     }
 
-    /// Waits until the device listens: while a person was asked something, the line may have fallen silent.
+    /// Waits until the device listens: while a person was asked something, the line may have fallen
+    /// silent.
     pub async fn settle(&mut self) -> Result<(), Error> {
         self.exchange().await?;
         self.until("the device did not answer; check that it runs this project's firmware", |bench| {
@@ -103,8 +105,8 @@ impl<'a> Bench<'a> {
         self.becomes(device).await.map(drop)
     }
 
-    /// Has the device, which `device` is what was found of, take itself for commissioned: it looks at what its own pulses have
-    /// shown. Its record.
+    /// Has the device, which `device` is what was found of, take itself for commissioned: it looks
+    /// at what its own pulses have shown. Its record.
     pub async fn commission(&mut self, device: &Device) -> Result<Record, Error> {
         self.driver.commission();
         self.becomes(&Device { commissioned: true, ..*device }).await

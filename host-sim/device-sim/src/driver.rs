@@ -1,8 +1,9 @@
-//! The PC's side of a conversation with a device, without clock or cable of its own: it is told the time and handed bytes.
+//! The PC's side of a conversation with a device, without clock or cable of its own: it is told the
+//! time and handed bytes.
 //!
-//! On a new connection it says hello, stops the device, configures it, and starts it only where a person asks: no set point of
-//! an earlier connection is ever played again. Commands are repeated until they are answered; a heartbeat says every 50 ms
-//! that the PC lives.
+//! On a new connection it says hello, stops the device, configures it, and starts it only where a
+//! person asks: no set point of an earlier connection is ever played again. Commands are repeated
+//! until they are answered; a heartbeat says every 50 ms that the PC lives.
 
 use control_core::compensation::Gains;
 use control_core::excitation::Excitation;
@@ -17,7 +18,8 @@ use std::time::Duration;
 pub(crate) const HEARTBEAT: Duration = Duration::from_millis(50);
 /// An unanswered command is repeated after this.
 pub(crate) const REPEAT: Duration = Duration::from_millis(100);
-/// A command that gives torque is not repeated to a device that has sent no samples for this long; it sends a block every 3.2 ms.
+/// A command that gives torque is not repeated to a device that has sent no samples for this long;
+/// it sends a block every 3.2 ms.
 const DOUBT: Duration = Duration::from_millis(50);
 /// A device that sends no samples for this long has started anew or is gone: hello again.
 pub const SILENCE: Duration = Duration::from_secs(1);
@@ -105,7 +107,8 @@ impl Driver {
         self.waiting.push_back(Command::Start);
     }
 
-    /// Takes the torque off. It overtakes everything but the configuration, and what it overtakes is forgotten.
+    /// Takes the torque off. It overtakes everything but the configuration, and what it overtakes
+    /// is forgotten.
     pub fn stop(&mut self) {
         self.waiting.retain(|c| {
             matches!(
@@ -135,8 +138,8 @@ impl Driver {
         self.waiting.push_back(Command::Excite(excitation));
     }
 
-    /// Plays excitations without a rest between them, with no hand on the needle: uploads them one by one, and the device checks
-    /// that it has all of them.
+    /// Plays excitations without a rest between them, with no hand on the needle: uploads them one
+    /// by one, and the device checks that it has all of them.
     pub fn play(&mut self, segments: Vec<Excitation>) {
         let play = Command::Play { count: segments.len() as u8, checksum: codec::hash(&segments.as_slice()) };
         for (index, excitation) in (0_u8..).zip(segments) {
@@ -145,7 +148,8 @@ impl Driver {
         self.waiting.push_back(play);
     }
 
-    /// Gives the device another patient; torque goes off for it. [`Self::take_change`] returns the answer.
+    /// Gives the device another patient; torque goes off for it. [`Self::take_change`] returns the
+    /// answer.
     pub fn configure_patient(&mut self, patient: Patient) {
         self.waiting.push_back(Command::ConfigurePatient(patient));
     }

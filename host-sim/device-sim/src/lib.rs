@@ -1,7 +1,9 @@
-//! The device without its hardware: plant and hand in floating point, the firmware's control core on them, and what a person
-//! chooses: patient, procedure, session. [`page`] is what a page is told.
+//! The device without its hardware: plant and hand in floating point, the firmware's control core
+//! on them, and what a person chooses: patient, procedure, session. [`page`] is what a page is
+//! told.
 //!
-//! No files but those a person names, no sockets, no ports: the browser's build (`site-wasm`) takes it as it is.
+//! No files but those a person names, no sockets, no ports: the browser's build (`site-wasm`) takes
+//! it as it is.
 
 pub mod device;
 pub mod driver;

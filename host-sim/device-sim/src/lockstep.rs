@@ -1,5 +1,6 @@
-//! A simulated device and the PC's side of its link in one thread, in step: a millisecond of ticks, then what each has for the
-//! other. The clock of both is the device's, so that a busy computer slows both and neither finds the other silent.
+//! A simulated device and the PC's side of its link in one thread, in step: a millisecond of ticks,
+//! then what each has for the other. The clock of both is the device's, so that a busy computer
+//! slows both and neither finds the other silent.
 
 use control_core::TICK_HZ;
 use link::codec::MAX_FRAME;
@@ -13,8 +14,8 @@ pub fn time(ticks: u64) -> Duration {
     Duration::from_micros(ticks * 1_000_000 / u64::from(TICK_HZ))
 }
 
-/// Passes every frame that waits for the PC to `take`, in order. `transmit` writes the next one and returns its length in
-/// bytes, 0 where nothing waits.
+/// Passes every frame that waits for the PC to `take`, in order. `transmit` writes the next one and
+/// returns its length in bytes, 0 where nothing waits.
 pub fn empty(mut transmit: impl FnMut(&mut [u8; MAX_FRAME]) -> usize, mut take: impl FnMut(&[u8])) {
     let mut frame = [0; MAX_FRAME];
     loop {

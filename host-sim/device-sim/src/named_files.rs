@@ -1,4 +1,5 @@
-//! Files that a person names: one of those that come with the program, by its name, or any file, by its path.
+//! Files that a person names: one of those that come with the program, by its name, or any file, by
+//! its path.
 
 use crate::error::Error;
 use serde::de::DeserializeOwned;
@@ -13,7 +14,8 @@ pub struct Text {
     pub text: String,
 }
 
-/// Finds `wanted` among `built_in` (name, text), else reads it as a path. `what` names the kind in errors.
+/// Finds `wanted` among `built_in` (name, text), else reads it as a path. `what` names the kind in
+/// errors.
 pub fn find(what: &str, wanted: &str, built_in: &[(&str, &str)]) -> Result<Text, Error> {
     if let Some((name, text)) = built_in.iter().find(|(name, _)| *name == wanted) {
         return Ok(Text { origin: format!("{what} {name}"), text: (*text).to_owned() });
@@ -40,7 +42,7 @@ pub fn parse<T: DeserializeOwned>(source: &Text) -> Result<T, Error> {
     toml::from_str(&source.text).map_err(|cause| {
         let before = cause.span().map_or(0, |span| span.start.min(source.text.len()));
         let line = source.text.as_bytes()[..before].iter().filter(|byte| **byte == b'\n').count() + 1;
-        // Whoever edits a form does not see lines: the key that stands there is named too.
+        // Whoever edits a form does not see lines: the key there is named too.
         let key = source
             .text
             .lines()

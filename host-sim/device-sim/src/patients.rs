@@ -1,4 +1,5 @@
-//! A patient as a picture in the terminal: who it is, and its layers to scale, with the forces at which they give way.
+//! A patient as a picture in the terminal: who it is, and its layers to scale, with the forces at
+//! which they give way.
 
 use crate::profile::Profile;
 use crate::session::{Scene, SceneLayer, Source};
@@ -22,7 +23,8 @@ pub fn picture(profile: &Profile) -> String {
     out
 }
 
-/// Returns the file's statements about the patient apart from the tissue: its single values, and those of its tables without layers.
+/// Returns the file's statements about the patient apart from the tissue: its single values, and
+/// those of its tables without layers.
 fn about(profile: &Profile) -> Vec<String> {
     let table: toml::Table = profile.source.text.parse().unwrap_or_default();
     let words = |table: &toml::Table| {
@@ -42,7 +44,8 @@ fn about(profile: &Profile) -> Vec<String> {
     std::iter::once(words(&table)).chain(about).filter(|line| !line.is_empty()).collect()
 }
 
-/// Layers from the skin down, a line for every half mm: where each begins stands beside its first line.
+/// Layers from the skin down, a line for every half mm: the beginning of each is next to its first
+/// line.
 fn draw(out: &mut String, scene: &Scene) {
     let deepest = scene.layers.iter().map(|l| l.depth_mm).fold(0.0, f64::max) + 1.5;
     let lines = (deepest / MM_PER_LINE).clamp(LINES.0, LINES.1).ceil();

@@ -1,6 +1,7 @@
-//! A scripted hand: where it wants the needle at every moment and at which angle, from a procedure that a person wrote (TOML). Moves
-//! follow the minimum-jerk path `s = 10τ³ − 15τ⁴ + 6τ⁵` (Flash and Hogan 1985, doi:10.1523/JNEUROSCI.05-07-01688.1985), or go at
-//! an even speed, as a stage does that measures insertion forces.
+//! A scripted hand: where it wants the needle at every moment and at which angle, from a procedure
+//! that a person wrote (TOML). Moves follow the minimum-jerk path `s = 10τ³ − 15τ⁴ + 6τ⁵` (Flash
+//! and Hogan 1985, doi:10.1523/JNEUROSCI.05-07-01688.1985), or go at an even speed, as a stage does
+//! that measures insertion forces.
 
 pub mod task;
 
@@ -92,8 +93,8 @@ struct HandFile {
     seed: u64,
 }
 
-/// A step moves to a depth, or past the puncture of a tissue, or by so much, or holds where none is given; smoothly in so many seconds, or
-/// at an even speed. On the way it may turn the needle.
+/// A step moves to a depth, or past the puncture of a tissue, or by so much, or holds where none is
+/// given; smoothly in so many seconds, or at an even speed. On the way it may turn the needle.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Step {
@@ -137,7 +138,8 @@ impl Procedure {
         Some(self.tasks.get(task)?.name.as_str())
     }
 
-    /// Returns the place where the hand wants the needle `seconds` into the procedure. Rounds repeat.
+    /// Returns the place where the hand wants the needle `seconds` into the procedure. Rounds
+    /// repeat.
     pub fn target(&self, seconds: f64) -> Target {
         let in_round = seconds.max(0.0) % self.round_s;
         let m = &self.moves[self.step_at(seconds)];
@@ -297,7 +299,8 @@ mod tests {
                 let now = procedure.target(f64::from(tick) * step);
                 let slope = (now.depth_mm - before.depth_mm) / step;
                 let mean = f64::midpoint(now.speed_mm_s, before.speed_mm_s);
-                // Where a stage starts or stops there is a step in its speed, and half of it within one tick.
+                // Where a stage starts or stops there is a step in its speed, and half of it within
+                // one tick.
                 let jump = (now.speed_mm_s - before.speed_mm_s).abs();
                 assert!((slope - mean).abs() < 0.01 + jump, "{name}: {slope} mm/s at tick {tick}");
                 before = now;

@@ -57,15 +57,16 @@ pub struct Case {
     pub disturbance: f64,
     /// Bandwidth over which it was measured, Hz.
     pub bandwidth_hz: f64,
-    /// Time between two readings that the diagnosis takes apart, s: a row of the recordings, or a block of a few if they are faster.
+    /// Time between two readings that the diagnosis takes apart, s: a row of the recordings, or a
+    /// block of a few if they are faster.
     pub reading_s: f64,
     /// The machine's limits.
     pub limits: Limits,
 }
 
 impl Case {
-    /// Reads the folder that `diagnose` wrote. A limit that is not given is the most that the report's recordings did (speed,
-    /// travel) or the rig allows (force).
+    /// Reads the folder that `diagnose` wrote. A limit that is not given is the most that the
+    /// report's recordings did (speed, travel) or the rig allows (force).
     ///
     /// # Errors
     /// One sentence: the file, what is wrong with it, what to do.
@@ -94,7 +95,7 @@ impl Case {
             }
         }
         let (left, floor) = (report.fit.patched.holdout, report.noise_floor);
-        // Counting is simulated by itself; what is left beside it disturbs.
+        // Counting is simulated by itself; the rest disturbs.
         let disturbance = (left * left - floor * floor).max(0.01 * floor * floor).sqrt();
         let bandwidth_hz = report.residual_bandwidth_hz.max(1.0);
         Ok(Self { rivals, disturbance, bandwidth_hz, reading_s: shown.reading_s, limits })
@@ -140,7 +141,7 @@ fn rivals(folder: &Path, report: &Report) -> Result<Vec<Rival>, String> {
     Case::normalise(&mut rivals);
     if rivals.len() < 2 {
         return Err(format!(
-            "{}: no two models contend for a name, so there is nothing to tell apart; the report's own sentence stands",
+            "{}: no two models contend for a name, so there is nothing to distinguish; the report's own sentence holds",
             folder.join("diagnosis.json").display()
         ));
     }

@@ -1,5 +1,5 @@
-//! The choice of the input: segments are added one after another, each the one that best tells the rivals apart together with those
-//! before it.
+//! The choice of the input: segments are added one after another, each the one that best tells the
+//! rivals apart together with those before it.
 
 use crate::case::{Case, Rival};
 use crate::innovation::{Filter, Gram, Unexpected};
@@ -8,11 +8,12 @@ use crate::library::library;
 use crate::predict::Prediction;
 use rayon::prelude::*;
 
-/// Nats beyond which only the logarithm of more counts: odds of 5e21, if the noise is as white as it is taken to be.
+/// Nats beyond which only the logarithm of more counts: odds of 5e21, if the noise is as white as
+/// it is taken to be.
 const ENOUGH_NATS: f64 = 50.0;
 /// Relative growth of the criterion for which a segment is added.
 const PAYS: f64 = 0.1;
-/// Nats below which a pair is not told apart: odds of 20 to 1.
+/// Nats below which a pair is not distinguished: odds of 20 to 1.
 const LEAST_NATS: f64 = 3.0;
 /// Relative differences of the criterion that do not count against a shorter input.
 const NEARLY: f64 = 0.03;
@@ -37,7 +38,8 @@ pub struct Pair {
 pub struct Alternative {
     /// The input.
     pub input: Input,
-    /// Expected worth of the nats between the truth and its nearest rival: nats up to 50, then their logarithm.
+    /// Expected worth of the nats between the truth and its nearest rival: nats up to 50, then
+    /// their logarithm.
     pub criterion: f64,
     /// Every ordered pair.
     pub pairs: Vec<Pair>,
@@ -89,7 +91,8 @@ impl Sums {
     }
 }
 
-/// The worth of so many nats: themselves, and beyond enough of them as much again for each factor of e.
+/// The worth of so many nats: themselves, and beyond enough of them as much again for each factor
+/// of e.
 fn worth(nats: f64) -> f64 {
     if nats <= ENOUGH_NATS { nats } else { ENOUGH_NATS * (1.0 + (nats / ENOUGH_NATS).ln()) }
 }
@@ -131,7 +134,8 @@ impl Bench<'_> {
         Some(Sums((0..rivals.len()).map(row).collect()))
     }
 
-    /// Adds segments to a first one while they pay, up to `most_s`, and one that travels if there is none.
+    /// Adds segments to a first one while they pay, up to `most_s`, and one that travels if there
+    /// is none.
     fn grown(&self, first: usize, all: &[(Segment, Sums)], most_s: f64) -> Vec<usize> {
         let value = |sums: &Sums| criterion(&self.case.rivals, &sums.nats());
         let (mut parts, mut sums) = (vec![first], all[first].1.clone());
@@ -164,7 +168,8 @@ impl Bench<'_> {
         parts
     }
 
-    /// The input as a whole, simulated once more from its start to its end; none if it leaves the limits.
+    /// The input as a whole, simulated once more from its start to its end; none if it leaves the
+    /// limits.
     fn whole(&self, input: Input) -> Option<(Alternative, Vec<Prediction>)> {
         let motions = self.motions(&input)?;
         let rivals = &self.case.rivals;
@@ -197,7 +202,8 @@ fn best(all: impl Iterator<Item = (usize, f64, f64)>) -> Option<(usize, f64, f64
     near.min_by(|a, b| a.2.total_cmp(&b.2).then(b.1.total_cmp(&a.1)))
 }
 
-/// Designs the input of at most `most_s` that best tells the rivals of a case apart; `seed` draws the library.
+/// Designs the input of at most `most_s` that best tells the rivals of a case apart; `seed` draws
+/// the library.
 ///
 /// # Errors
 /// One sentence if every input of the library leaves the limits.
@@ -227,7 +233,8 @@ pub fn design(case: &Case, most_s: f64, seed: u64) -> Result<Design, String> {
     firsts.sort_by(|a, b| b.1.total_cmp(&a.1).then(all[a.0].0.seconds.total_cmp(&all[b.0].0.seconds)));
     let grown = |(first, _): &(usize, f64)| {
         let mut parts = bench.grown(*first, &all, most_s);
-        // Segments begin where the one before ended, so that together they may travel further than each alone.
+        // Segments begin where the one before ended, so that together they may travel further than
+        // each alone.
         loop {
             let segments = parts.iter().map(|k| all[*k].0.clone()).collect();
             if let Some(whole) = bench.whole(Input { segments }) {
@@ -287,7 +294,8 @@ fn inseparable(case: &Case, all: &[(Segment, Sums)], chosen: &Alternative) -> Ve
 }
 
 impl Design {
-    /// A sentence without its full stop: the pairs that no input distinguishes; none if there are none.
+    /// A sentence without its full stop: the pairs that no input distinguishes; none if there are
+    /// none.
     pub fn limits_in_words(&self) -> Option<String> {
         let pairs: Vec<String> = self.inseparable.iter().map(|(a, b)| format!("{a} from {b}")).collect();
         (!pairs.is_empty()).then(|| {

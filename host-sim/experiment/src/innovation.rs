@@ -1,9 +1,11 @@
 //! The innovations that a rival predicts while another is true, and the distance between both.
 //!
-//! Along the true motion (of rival i) the axis accelerates by F_i/J_i where the rival j expects F_j/J_j, and the sensor adds s_i
-//! where j expects s_j. A steady Kalman filter of j for position and speed, with the sensor's counting and a white force as noise, turns
-//! both differences into innovations that j did not expect. They are linear in the differences, so that refitting j to them is a
-//! regularised least squares; half of the remaining sum of squares is the Kullback–Leibler distance, in nats.
+//! Along the true motion (of rival i) the axis accelerates by F_i/J_i where the rival j expects
+//! F_j/J_j, and the sensor adds s_i where j expects s_j. A steady Kalman filter of j for position
+//! and speed, with the sensor's counting and a white force as noise, turns both differences into
+//! innovations that j did not expect. They are linear in the differences, so that refitting j to
+//! them is a regularised least squares; half of the remaining sum of squares is the
+//! Kullback–Leibler distance, in nats.
 
 use crate::case::{Case, Rival};
 use crate::predict::{Prediction, STEP_S};
@@ -43,7 +45,8 @@ impl Filter {
         Self { block_s, rows, gain, deviation, count }
     }
 
-    /// Innovations, in standard deviations, that differences of acceleration and reading leave, a block each.
+    /// Innovations, in standard deviations, that differences of acceleration and reading leave, a
+    /// block each.
     fn innovations(&self, acceleration: &[f64], reading: &[f64]) -> Vec<f64> {
         let (mut position, mut speed) = (0.0, 0.0);
         let t = self.block_s;
@@ -117,13 +120,15 @@ fn rests(motion: &Prediction, filter: &Filter) -> Vec<bool> {
         .collect()
 }
 
-/// A value of a rival that a refit may move: the rig with it moved by one unit, and its standard deviation in units.
+/// A value of a rival that a refit may move: the rig with it moved by one unit, and its standard
+/// deviation in units.
 struct Moved {
     rig: Rig,
     deviation: f64,
 }
 
-/// Relative move of a value, and relative standard deviations of what is measured easily, of friction and of effects.
+/// Relative move of a value, and relative standard deviations of what is measured easily, of
+/// friction and of effects.
 const MOVE: f64 = 0.05;
 const EASY: f64 = 0.1;
 const FRICTION: f64 = 0.5;
@@ -168,10 +173,9 @@ fn moved(rig: &Rig, with_effects: bool) -> Vec<Moved> {
             };
             push(&change, COEFFICIENT);
         }
-        let is_fixed = |key: &str| key == "turn" || key.starts_with("order_") || key.starts_with("period_");
-        for (key, value) in effect.shape.iter().filter(|(key, value)| !is_fixed(key) && **value != 0.0) {
+        for (key, value) in effect.uncertain_values() {
             let change = |rig: &mut Rig| {
-                rig.effects[i].shape.insert(key.clone(), value * (1.0 + MOVE));
+                rig.effects[i].shape.insert(key.to_owned(), value * (1.0 + MOVE));
                 true
             };
             push(&change, FRICTION);
@@ -180,8 +184,8 @@ fn moved(rig: &Rig, with_effects: bool) -> Vec<Moved> {
     out
 }
 
-/// Sums of products of the innovations that a rival did not expect and of what each of its values would change: they add up over
-/// segments.
+/// Sums of products of the innovations that a rival did not expect and of what each of its values
+/// would change: they add up over segments.
 #[derive(Clone, Debug)]
 pub(crate) struct Gram {
     size: usize,
@@ -261,8 +265,8 @@ impl Unexpected {
             let reading: Vec<f64> = a.reading.iter().zip(&b.reading).map(|(a, b)| a - b).collect();
             filter.innovations(&acceleration, &reading)
         };
-        // The model without an effect is the effect of size zero: a rival with more effects than the truth keeps their sizes, or no
-        // input could ever speak for the truth.
+        // The model without an effect is the effect of size zero: a rival with more effects than
+        // the truth keeps their sizes, or no input could ever speak for the truth.
         let with_effects = rival.rig.effects.len() <= truth.rig.effects.len();
         let moved = moved(&rival.rig, with_effects);
         let columns =
@@ -302,7 +306,8 @@ mod tests {
     fn the_steady_filter_whitens_its_own_innovations() {
         let (t, reading, accelerating) = (2.5e-3, 1e-9, 4.0);
         let (gain, deviation) = steady(t, reading, accelerating);
-        // A pseudo-random run of the model through the filter: the innovations have the computed variance and do not correlate.
+        // A pseudo-random run of the model through the filter: the innovations have the computed
+        // variance and do not correlate.
         let mut state = 1_u64;
         let mut normal = || {
             let mut unit = || {

@@ -1,9 +1,11 @@
-//! Inputs: signals one after the other, those that the device can play (`control_core::excitation`), in the coordinate of a rig.
+//! Inputs: signals one after the other, those that the device can play
+//! (`control_core::excitation`), in the coordinate of a rig.
 
 use crate::case::Limits;
 use std::f64::consts::{PI, TAU};
 
-/// Natural frequency of the servo that follows a reference, rad/s: a device's speed estimate is 6 ms late, which leaves it well damped.
+/// Natural frequency of the servo that follows a reference, rad/s: a device's speed estimate is 6
+/// ms late, which leaves it well damped.
 const SERVO_RAD_PER_S: f64 = 50.0;
 /// Its damping ratio.
 const SERVO_DAMPING_RATIO: f64 = 0.9;
@@ -23,7 +25,8 @@ impl Servo {
         Self::of_frequency(inertia, SERVO_RAD_PER_S)
     }
 
-    /// The same for a machine with limits, softer if a reversal at its speed would take more than its force.
+    /// The same for a machine with limits, softer if a reversal at its speed would take more than
+    /// its force.
     pub(crate) fn within(inertia: f64, limits: &Limits) -> Self {
         let reversal = 4.0 * SERVO_DAMPING_RATIO * inertia * limits.speed;
         Self::of_frequency(inertia, SERVO_RAD_PER_S.min(limits.force / reversal))
@@ -37,7 +40,8 @@ impl Servo {
     }
 }
 
-/// A signal. Those with a reference need the servo; the others add a force while the servo holds the place of the start.
+/// A signal. Those with a reference need the servo; the others add a force while the servo holds
+/// the place of the start.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Signal {
     /// Constant speeds, each there and back, each `ratio` times the one before.
@@ -221,8 +225,8 @@ impl Input {
         self.segments.iter().map(one).collect::<Vec<_>>().join(", then ")
     }
 
-    /// A similar input with other numbers, to judge what was fitted to this one: strokes, speeds and forces by a factor below one,
-    /// sines at their neighbours' frequencies.
+    /// A similar input with other numbers, to judge what was fitted to this one: strokes, speeds
+    /// and forces by a factor below one, sines at their neighbours' frequencies.
     pub fn varied(&self) -> Self {
         const LESS: f64 = 0.83;
         let vary = |segment: &Segment| {

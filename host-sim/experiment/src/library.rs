@@ -44,8 +44,9 @@ const BLOCK_S: f64 = 2.6e-3;
 /// Periods of a sine between two readings of a slow recording that still show its force.
 const PERIODS: f64 = 0.2;
 
-/// The highest frequency that recordings show, Hz, `reading_s` being the time between two readings: blocks of a fast recording hold
-/// some of what is faster than they are, and rows of a slow one do not.
+/// The highest frequency that recordings show, Hz, `reading_s` being the time between two readings:
+/// blocks of a fast recording hold some of what is faster than they are, and rows of a slow one do
+/// not.
 fn highest_hz(reading_s: f64) -> u16 {
     if reading_s <= BLOCK_S { u16::MAX } else { (PERIODS / reading_s) as u16 }
 }
@@ -104,8 +105,8 @@ impl Random {
     }
 }
 
-/// Returns a multisine of a random band and strength within 80 % of the limits, `dry` being the dry friction: what a design is
-/// compared with.
+/// Returns a multisine of a random band and strength within 80 % of the limits, `dry` being the dry
+/// friction: what a design is compared with.
 pub fn random_multisine(limits: &Limits, dry: f64, seed: u64, seconds: f64) -> Segment {
     let limits = limits.usable();
     let mut random = Random(seed ^ 0xA5A5);

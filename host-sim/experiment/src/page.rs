@@ -18,7 +18,7 @@ pub(crate) fn html(design: &Design) -> String {
         design.chosen.input.in_words(kind.length(), kind.force()),
         short(design.chosen.input.seconds()),
         nearest.map_or(String::new(), |pair| format!(
-            "The pair that is hardest to tell apart, {} and {}, ends with odds of {} ({} nats).",
+            "The pair that is hardest to distinguish, {} and {}, ends with odds of {} ({} nats).",
             pair.truth,
             pair.rival,
             odds(pair.nats),

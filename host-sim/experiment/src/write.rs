@@ -11,7 +11,8 @@ use std::path::{Path, PathBuf};
 const EVERY: usize = 10;
 
 impl Design {
-    /// Writes `command.csv`, `reference.csv`, `predicted.csv`, `experiment.json` and `experiment.html` to a folder; returns their paths.
+    /// Writes `command.csv`, `reference.csv`, `predicted.csv`, `experiment.json` and
+    /// `experiment.html` to a folder; returns their paths.
     ///
     /// # Errors
     /// One sentence: the file, the cause, what to do.
@@ -48,7 +49,8 @@ impl Design {
         out
     }
 
-    /// The reference at 10 kHz, in rad or m from the start, and the force in addition to the loop's.
+    /// The reference at 10 kHz, in rad or m from the start, and the force in addition to the
+    /// loop's.
     fn reference_csv(&self) -> String {
         let mut out = String::from("time_s,reference,force\n");
         let segments = self.chosen.input.segments.iter();

@@ -87,7 +87,8 @@ fn rivals_that_are_the_same_are_told_apart_by_nothing() {
 
 #[test]
 fn a_rival_that_can_imitate_by_other_values_is_not_told_apart() {
-    // The same friction as a value of the rig and as an effect: unequal as they are, equal once refitted.
+    // The same friction as a value of the rig and as an effect: unequal as they are, equal once
+    // refitted.
     let mut less = rival("less", 0.5, Vec::new());
     less.rig.model.coulomb = Some(3.6e-4);
     let case = case(vec![rival("more", 0.5, Vec::new()), less]);

@@ -1,6 +1,7 @@
 //! Curves in a frame with scales, as SVG that takes its colours from the page.
 
-use super::{decimal, safe};
+use crate::drawing::{decimals, path, round_step, ticks};
+use crate::{decimal, safe};
 use std::fmt::Write as _;
 
 /// Drawing units: on a phone two thirds of them are a pixel, so that 14 stay readable.
@@ -85,7 +86,8 @@ impl Chart {
         for curve in &self.curves {
             let dash = if curve.dashed { " dash" } else { "" };
             let _ = write!(out, "<path class=\"s s{}{dash}\" d=\"", curve.colour);
-            draw_curve(&mut out, &thinned(&curve.points), &to_x, &to_y);
+            let place = |(x, y): (f64, f64)| (x.is_finite() && y.is_finite()).then(|| (to_x(x), to_y(y)));
+            path(&mut out, thinned(&curve.points).into_iter().map(place));
             out.push_str("\"/>");
         }
         let _ = write!(
@@ -158,9 +160,8 @@ struct Scale {
 
 impl Scale {
     fn exact(low: f64, high: f64) -> Self {
-        let step = round_step((high - low) / 6.0);
-        let decimals = (-step.log10()).ceil().clamp(0.0, 9.0) as usize;
-        Self { low, high, step, decimals }
+        let step = round_step(((high - low) / 6.0).max(1e-12));
+        Self { low, high, step, decimals: decimals(step) }
     }
 
     fn rounded(low: f64, high: f64) -> Self {
@@ -169,21 +170,9 @@ impl Scale {
         Self { low: (low / step + 1e-9).floor() * step, high: (high / step - 1e-9).ceil() * step, ..scale }
     }
 
-    fn ticks(&self) -> impl Iterator<Item = f64> + use<> {
-        let Self { low, high, step, .. } = *self;
-        let first = (low / step - 1e-9).ceil();
-        (0..20).map(move |n| (first + f64::from(n)) * step).take_while(move |v| *v <= high + 1e-9 * step)
+    fn ticks(&self) -> Vec<f64> {
+        ticks(self.low, self.high, self.step)
     }
-}
-
-/// 1, 2 or 5 times a power of ten, not below `wanted`.
-fn round_step(wanted: f64) -> f64 {
-    let power = 10_f64.powf(wanted.max(1e-12).log10().floor());
-    [1.0, 2.0, 5.0, 10.0]
-        .into_iter()
-        .map(|m| m * power)
-        .find(|s| *s >= wanted * 0.999)
-        .unwrap_or(10.0 * power)
 }
 
 /// Names in rows that fit, each with its place.
@@ -240,23 +229,6 @@ fn thinned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     kept
 }
 
-fn draw_curve(
-    out: &mut String,
-    points: &[(f64, f64)],
-    to_x: &impl Fn(f64) -> f64,
-    to_y: &impl Fn(f64) -> f64,
-) {
-    let mut pen = 'M';
-    for (x, y) in points {
-        if x.is_finite() && y.is_finite() {
-            let _ = write!(out, "{pen}{:.1} {:.1}", to_x(*x), to_y(*y));
-            pen = 'L';
-        } else {
-            pen = 'M';
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -265,11 +237,11 @@ mod tests {
     fn ticks_are_round_and_lie_within() {
         let scale = Scale::rounded(-0.13, 2.9);
         assert_eq!((scale.low, scale.decimals), (-1.0, 0));
-        assert_eq!(scale.ticks().collect::<Vec<_>>(), [-1.0, 0.0, 1.0, 2.0, 3.0]);
+        assert_eq!(scale.ticks(), [-1.0, 0.0, 1.0, 2.0, 3.0]);
         let scale = Scale::rounded(0.0, 60.0);
         assert_eq!((scale.low, scale.high), (0.0, 60.0), "a round range stays what it is");
         let scale = Scale::exact(0.0, 0.7);
-        assert!(scale.ticks().zip([0.0, 0.2, 0.4, 0.6]).all(|(a, b)| (a - b).abs() < 1e-12));
+        assert!(scale.ticks().iter().zip([0.0, 0.2, 0.4, 0.6]).all(|(a, b)| (a - b).abs() < 1e-12));
         assert_eq!(scale.decimals, 1);
     }
 

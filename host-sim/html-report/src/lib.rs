@@ -1,7 +1,11 @@
-//! Pages to read and to print: one HTML file each, with everything inside, drawn as SVG. It knows text, tables and curves, and
-//! nothing of needles; what stands on a page is its caller's.
+//! Pages to read and to print: one HTML file each, with everything inside, drawn as SVG. It knows
+//! text, tables and curves, and nothing of needles; the content of a page is its caller's.
+//! [`Sheet`] and [`chart`] are a page in one style; a page with a style of its own is a
+//! [`document`], which may have [`plot`]s.
 
 pub mod chart;
+pub mod drawing;
+pub mod plot;
 pub mod section;
 
 use std::fmt::Write as _;
@@ -113,14 +117,20 @@ impl Sheet {
 
     /// The whole file.
     pub fn finish(self) -> String {
-        format!(
-            "<!doctype html>\n<html lang=en><head><meta charset=utf-8><meta name=viewport content=\"width=device-width, \
-             initial-scale=1\"><meta name=color-scheme content=\"light dark\"><title>{}</title><style>{STYLE}</style></head>\
-             <body><main>{}</main></body></html>\n",
-            safe(&self.title),
-            self.body
-        )
+        document(&self.title, STYLE, &self.body, None)
     }
+}
+
+/// Returns a whole page with everything inside: `body` is its markup, `style` its CSS and `script`
+/// its JavaScript.
+pub fn document(title: &str, style: &str, body: &str, script: Option<&str>) -> String {
+    let script = script.map_or_else(String::new, |script| format!("<script>{script}</script>"));
+    format!(
+        "<!doctype html>\n<html lang=en><head><meta charset=utf-8><meta name=viewport content=\"width=device-width, \
+         initial-scale=1\"><meta name=color-scheme content=\"light dark\"><title>{}</title><style>{style}</style></head>\
+         <body><main>{body}</main>{script}</body></html>\n",
+        safe(title)
+    )
 }
 
 #[cfg(test)]

@@ -1,4 +1,5 @@
-//! The anatomy in section, true to scale, with the ways that a needle's tip took through it, as SVG.
+//! The anatomy in section, true to scale, with the ways that a needle's tip took through it, as
+//! SVG.
 
 use super::{decimal, safe};
 use std::fmt::Write as _;

@@ -1,5 +1,5 @@
-//! The work of a lab before a trainee uses a device: commissioning, characterisation, compensation, force laws from tests, and diagnoses that
-//! a device settles itself.
+//! The work of a lab before a trainee uses a device: commissioning, characterisation, compensation,
+//! force laws from tests, and diagnoses that a device settles itself.
 
 pub mod characterise;
 pub mod commission;

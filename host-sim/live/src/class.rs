@@ -20,8 +20,8 @@ const PAUSE: Duration = Duration::from_millis(100);
 
 /// Show a class of devices: everyone's needle, live scores, who is stuck, who is gone.
 ///
-/// Devices join with `run --class NAME`. The page only shows: it cannot start anything. Needs a build with
-/// `--features class`.
+/// Devices join with `run --class NAME`. The page only shows: it cannot start anything. Needs a
+/// build with `--features class`.
 #[derive(Args)]
 #[command(after_help = examples!("Examples:
   host-sim class ward-3
@@ -67,7 +67,8 @@ impl Class {
 /// The options by which a run joins a class.
 #[derive(Args)]
 pub(crate) struct ClassFlags {
-    /// Publish pose, events and scores to the class of this name; needs a build with --features class
+    /// Publish pose, events and scores to the class of this name; needs a build with --features
+    /// class
     #[arg(long, value_name = "NAME")]
     class: Option<Name>,
     /// Name of this device in the class; without it, this computer's name

@@ -5,14 +5,16 @@ use device_sim::error::Error;
 use device_sim::profile::{InBody, Profile};
 use serde_json::json;
 
-/// List what a needle meets on a straight line into a body: structures with mm along the needle, and the layers that the device gets
+/// List what a needle meets on a straight line into a body: structures with mm along the needle,
+/// and the layers that the device gets
 #[derive(Args)]
 #[command(after_help = examples!("Example: host-sim layers --profile forearm --along 10 --around 5 --angle 45"))]
 pub struct Layers {
     /// A patient with a [body]: shoulder-joint, forearm, knee, hip, or a TOML file
     #[arg(long, default_value = "forearm")]
     profile: String,
-    /// The point of entry along the limb, away from the trunk, in mm; without it, as the patient's file says, like the rest
+    /// The point of entry along the limb, away from the trunk, in mm; without it, as the patient's
+    /// file says, like the rest
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     along: Option<f64>,
     /// The point of entry around the limb from its top, in degrees

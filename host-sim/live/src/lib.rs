@@ -1,5 +1,6 @@
-//! The commands that show the device and judge what it recorded, and what every command of the program needs: options, output,
-//! progress, a serial port. Nothing here needs the diagnosis, so that the first command has little to build.
+//! The commands that show the device and judge what it recorded, and what every command of the
+//! program needs: options, output, progress, a serial port. Nothing here needs the diagnosis, so
+//! that the first command has little to build.
 
 /// Prints a line. A closed pipe is not an error.
 #[macro_export]

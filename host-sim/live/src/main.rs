@@ -1,5 +1,5 @@
-//! The program of the first command, `cargo run --release`: it has what shows a device, and hands every other command to `host-sim`,
-//! which has them all and takes longer to build.
+//! The program of the first command, `cargo run --release`: it has what shows a device, and hands
+//! every other command to `host-sim`, which has them all and takes longer to build.
 
 mod whole;
 

@@ -1,5 +1,5 @@
-//! The end of a program: help goes to standard output, an error is one line and an exit status, 1 if the request failed, 2 for unusable
-//! input.
+//! The end of a program: help goes to standard output, an error is one line and an exit status, 1
+//! if the request failed, 2 for unusable input.
 
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use device_sim::error::Error;

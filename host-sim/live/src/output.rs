@@ -28,7 +28,8 @@ pub fn is_verbose() -> bool {
     VERBOSE.load(Ordering::Relaxed)
 }
 
-/// Returns true if standard output takes colours: a terminal whose user has not set `NO_COLOR` (no-color.org).
+/// Returns true if standard output takes colours: a terminal whose user has not set `NO_COLOR`
+/// (no-color.org).
 fn takes_colours() -> bool {
     std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty())
 }

@@ -1,4 +1,5 @@
-//! Progress of long work: one line on a terminal, nothing in a pipe; with `--verbose` a line for each stage.
+//! Progress of long work: one line on a terminal, nothing in a pipe; with `--verbose` a line for
+//! each stage.
 
 use std::io::{IsTerminal, Write};
 use std::time::{Duration, Instant};
@@ -59,7 +60,8 @@ impl Progress {
     }
 }
 
-/// The time that is left of work that took `elapsed` s for a part of it, as words; none while too little is done to say it.
+/// The time that is left of work that took `elapsed` s for a part of it, as words; none while too
+/// little is done to say it.
 fn left(elapsed: f64, part: f64) -> Option<String> {
     if elapsed < 2.0 || !(0.05..1.0).contains(&part) {
         return None;

@@ -10,7 +10,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-/// Play a recording in the visualizer, in a loop; Stop and Start on the page pause and resume it, a slider moves it.
+/// Play a recording in the visualizer, in a loop; Stop and Start on the page pause and resume it, a
+/// slider moves it.
 #[derive(Args)]
 #[command(after_help = examples!("Example: host-sim replay session.mcap --port 8711"))]
 pub struct Replay {

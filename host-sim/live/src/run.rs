@@ -34,9 +34,9 @@ use training::debrief;
 
 /// Run a virtual or real device, show it and record it.
 ///
-/// On a virtual device a scripted hand performs the procedure until a person takes the needle on the page. On a real
-/// device the torque stays off until a person presses Start there.
-/// The last line on standard output summarises the run.
+/// On a virtual device a scripted hand performs the procedure until a person takes the needle on
+/// the page. On a real device the torque stays off until a person presses Start there. The last
+/// line on standard output summarises the run.
 #[derive(Args)]
 #[command(after_help = examples!("Examples:
   host-sim run --profile firm-skin
@@ -47,26 +47,29 @@ pub struct Run {
     /// `virtual`, or the serial port of a device, such as /dev/ttyACM0
     #[arg(long, default_value = "virtual", value_name = "virtual|PATH")]
     device: String,
-    /// Procedure of the scripted hand: venepuncture, slow, shoulder-straight, insertion-5mms-60deg …, or a TOML file like those in
-    /// host-sim/procedures; without it, the one in the patient's file
+    /// Procedure of the scripted hand: venepuncture, slow, shoulder-straight, insertion-5mms-60deg
+    /// …, or a TOML file like those in host-sim/procedures; without it, the one in the patient's
+    /// file
     #[arg(long, value_name = "NAME|FILE")]
     procedure: Option<String>,
-    /// The patient: adult, thin-elderly, high-body-mass, firm-skin, dorsal-hand, shoulder, phantom, those with a body in three
-    /// dimensions (shoulder-joint, forearm, knee, hip), or a TOML file like those in
-    /// host-sim/profiles; without it, adult, or the default one of --model
+    /// The patient: adult, thin-elderly, high-body-mass, firm-skin, dorsal-hand, shoulder, phantom,
+    /// those with a body in three dimensions (shoulder-joint, forearm, knee, hip), or a TOML file
+    /// like those in host-sim/profiles; without it, adult, or the default one of --model
     #[arg(long, value_name = "NAME|FILE")]
     profile: Option<String>,
-    /// The device's construction: a TOML file as commissioning writes it, or paper-001; without it, a real device keeps its own
+    /// The device's construction: a TOML file as commissioning writes it, or paper-001; without it,
+    /// a real device keeps its own
     #[arg(long, value_name = "NAME|FILE")]
     device_config: Option<PathBuf>,
     /// The force law; the patient must use the same
     #[arg(long, value_enum)]
     model: Option<ModelName>,
-    /// The scripted hand's angle to the skin on a virtual device, 5 to 90; without it, the patient's
+    /// The scripted hand's angle to the skin on a virtual device, 5 to 90; without it, the
+    /// patient's
     #[arg(long, value_name = "DEG")]
     angle: Option<f64>,
-    /// On a virtual device with the law xr: count depth from the surface of the deformed tissue (Table 1 of paper 000) instead
-    /// of from where it was at rest
+    /// On a virtual device with the law xr: count depth from the surface of the deformed tissue
+    /// (Table 1 of paper 000) instead of from where it was at rest
     #[arg(long)]
     deformed: bool,
     /// Serve no page; a real device is then started at once
@@ -87,9 +90,10 @@ pub struct Run {
     /// Port of the page on this computer; 0 for any free port
     #[arg(long, default_value_t = PORT, value_name = "N")]
     port: u16,
-    /// Show the page to other computers, tablets and phones too: an address of this one (0.0.0.0: all of them), and a port if
-    /// not 8710. They need the token in the address that is printed, with its QR code. Use it in a network that you trust: whoever
-    /// has the token moves the needle, and nothing is encrypted
+    /// Show the page to other computers, tablets and phones too: an address of this one (0.0.0.0:
+    /// all of them), and a port if not 8710. They need the token in the address that is printed,
+    /// with its QR code. Use it in a network that you trust: whoever has the token moves the
+    /// needle, and nothing is encrypted
     #[arg(long, value_name = "ADDRESS[:PORT]", value_parser = address, conflicts_with_all = ["port", "headless"])]
     listen: Option<SocketAddr>,
     #[command(flatten)]
@@ -142,7 +146,8 @@ impl Run {
         let setup = self.setup(&chosen);
         let (session, publisher) =
             session::open(chosen.profile.scene(self.source(), setup.procedure.clone()));
-        // The port is taken before the file is made: a page that cannot be served must not cost a recording.
+        // The port is taken before the file is made: a page that cannot be served must not cost a
+        // recording.
         let _streams = self.streams.serve(&session)?;
         let _class = self.class.join(&session, chosen.device)?;
         let looks = (!self.headless).then(|| session.subscribe());
@@ -202,7 +207,8 @@ impl Run {
         }
     }
 
-    /// Builds the loop between the device and its outlets. `looks` is what the page's practice sees.
+    /// Builds the loop between the device and its outlets. `looks` is what the page's practice
+    /// sees.
     fn run_loop<'a>(
         &self,
         chosen: &Chosen,
@@ -224,7 +230,8 @@ impl Run {
         if self.is_virtual() || self.headless {
             if self.zero { run_loop.zeroing_first() } else { run_loop }
         } else {
-            // A real motor comes on when somebody who sees it says so; without a page, this command is what says it.
+            // A real motor comes on when somebody who sees it says so; without a page, this command
+            // is what says it.
             note!("the torque is off: press Start in the page");
             run_loop.wait_for_a_person()
         }
@@ -321,7 +328,8 @@ impl Run {
 
 /// Port of the page.
 const PORT: u16 = 8710;
-/// The folder of the patients that were saved in the page, in the one that the program was started in.
+/// The folder of the patients that were saved in the page, in the one that the program was started
+/// in.
 const PATIENTS: &str = "patients";
 
 /// Reads an address with or without a port.

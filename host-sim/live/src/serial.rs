@@ -1,4 +1,5 @@
-//! A device behind a serial port: USB CDC, where the baud rate means nothing, or anything else that carries bytes.
+//! A device behind a serial port: USB CDC, where the baud rate means nothing, or anything else that
+//! carries bytes.
 
 use device_sim::device::{Port, Wire};
 use device_sim::error::Error;

@@ -7,8 +7,9 @@ use server::streams::{self, Spec, Streams, Token};
 
 #[derive(Args)]
 pub(crate) struct StreamFlags {
-    /// Stream poses live; may be repeated: openigtlink (3D Slicer, port 18944), websocket (JSON, 8711), udp (JSON for
-    /// PlotJuggler, 9870), foxglove (8765); on this computer unless an address is given
+    /// Stream poses live; may be repeated: openigtlink (3D Slicer, port 18944), websocket (JSON,
+    /// 8711), udp (JSON for PlotJuggler, 9870), foxglove (8765); on this computer unless an address
+    /// is given
     #[arg(long = "stream", value_name = "KIND[=ADDRESS:PORT]")]
     streams: Vec<Spec>,
     /// Token that a client on another computer must send first; at least 12 characters

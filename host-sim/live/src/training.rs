@@ -11,7 +11,8 @@ use training::score::tasks::{TaskResult, Tasks};
 use training::score::{Insertion, score};
 use training::xapi::statements;
 
-/// Print a trainee's figures for every insertion and in total: time, path, force, vessel, angle, smoothness.
+/// Print a trainee's figures for every insertion and in total: time, path, force, vessel, angle,
+/// smoothness.
 ///
 /// docs/training.md explains each figure.
 #[derive(Args)]
@@ -34,7 +35,8 @@ pub struct Score {
     actor: Option<String>,
 }
 
-/// Write a page to print: the gesture over the anatomy, force against depth, the figures, the first and the last attempt compared.
+/// Write a page to print: the gesture over the anatomy, force against depth, the figures, the first
+/// and the last attempt compared.
 #[derive(Args)]
 #[command(after_help = examples!("Example: host-sim debrief monday.mcap friday.mcap --out debrief"))]
 pub struct Debrief {

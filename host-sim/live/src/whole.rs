@@ -1,5 +1,5 @@
-//! Hands the command line to `host-sim`. Under `cargo run`, cargo builds that program first, in the same profile and with the same
-//! features, so that it is never older than its source.
+//! Hands the command line to `host-sim`. Under `cargo run`, cargo builds that program first, in the
+//! same profile and with the same features, so that it is never older than its source.
 
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -13,7 +13,8 @@ const FEATURES: [(&str, bool); 4] = [
     ("ros", cfg!(feature = "ros")),
 ];
 
-/// Builds `host-sim` where cargo runs this program, runs it with the same arguments, and returns its exit status.
+/// Builds `host-sim` where cargo runs this program, runs it with the same arguments, and returns
+/// its exit status.
 pub(crate) fn run() -> ExitCode {
     let Ok(program) = std::env::current_exe().map(|own| beside(&own)) else {
         return refused("its own place is not known; start host-sim itself");
@@ -34,7 +35,8 @@ pub(crate) fn run() -> ExitCode {
     }
 }
 
-/// Puts a program in the place of this one, so that a signal that ends this process ends it, and with it a device's torque.
+/// Puts a program in the place of this one, so that a signal that ends this process ends it, and
+/// with it a device's torque.
 #[cfg(unix)]
 fn become_it(command: &mut Command) -> std::io::Result<ExitCode> {
     use std::os::unix::process::CommandExt;

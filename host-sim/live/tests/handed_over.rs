@@ -1,4 +1,5 @@
-//! The program of the first command hands over what it lacks. `host-sim` and cargo are scripts here, which say what they were asked.
+//! The program of the first command hands over what it lacks. `host-sim` and cargo are scripts
+//! here, which say what they were asked.
 #![cfg(unix)]
 
 use std::fs;

@@ -1,8 +1,9 @@
-//! Foxglove's well-known messages as Protobuf: the needle's transform, and needle and tissue as a scene. Whoever knows
-//! these schemas draws them without being told what they mean.
+//! Foxglove's well-known messages as Protobuf: the needle's transform, and needle and tissue as a
+//! scene. Whoever knows these schemas draws them without being told what they mean.
 //!
-//! Written here because a Protobuf library is a large build for two messages of numbers. The schemas in `schemas/foxglove` are the
-//! descriptors of PyPI's `foxglove-schemas-protobuf`; `cargo xtask test clients` compares them and reads what is written.
+//! Written here because a Protobuf library is a large build for two messages of numbers. The
+//! schemas in `schemas/foxglove` are the descriptors of PyPI's `foxglove-schemas-protobuf`; `cargo
+//! xtask test clients` compares them and reads what is written.
 
 use device_sim::session::{Scene, SceneNeedle};
 
@@ -12,7 +13,8 @@ pub(crate) const CHANNELS: [(&str, &str, &[u8]); 2] = [
     ("/scene", "foxglove.SceneUpdate", include_bytes!("schemas/foxglove/SceneUpdate.binpb")),
 ];
 
-/// The frame of the point of entry: x along the skin in the needle's plane, y across, z out of the skin.
+/// The frame of the point of entry: x along the skin in the needle's plane, y across, z out of the
+/// skin.
 const SKIN: &str = "skin";
 /// The frame of the tip: x in the direction of insertion.
 const NEEDLE: &str = "needle";
@@ -78,7 +80,8 @@ fn metres(mm: [f64; 3]) -> Vec<u8> {
     numbers(&mm.map(|mm| mm / 1_000.0))
 }
 
-/// `FrameTransform` of a needle `depth_mm` past the point of entry, `tilt_rad` below the horizontal.
+/// `FrameTransform` of a needle `depth_mm` past the point of entry, `tilt_rad` below the
+/// horizontal.
 pub(crate) fn transform(ns: u64, depth_mm: f64, tilt_rad: f64) -> Vec<u8> {
     let (sine, cosine) = tilt_rad.sin_cos();
     let (half_sine, half_cosine) = (tilt_rad / 2.0).sin_cos();
@@ -111,7 +114,8 @@ fn pose(centre_mm: [f64; 3], turn: &[f64; 4]) -> Vec<u8> {
     Fields::default().bytes(1, &metres(centre_mm)).bytes(2, &numbers(turn)).0
 }
 
-/// A `CylinderPrimitive` along x: its middle, its heights perpendicular to the skin and across, its length.
+/// A `CylinderPrimitive` along x: its middle, its heights perpendicular to the skin and across, its
+/// length.
 fn tube(centre_mm: [f64; 3], size_mm: [f64; 3], colour: &[f64; 4]) -> Vec<u8> {
     let mut cylinder = Fields::default().bytes(1, &pose(centre_mm, &LAID)).bytes(2, &metres(size_mm));
     for field in [3, 4] {

@@ -1,5 +1,6 @@
-//! Recordings: an MCAP file whose messages are JSON, so that any MCAP tool reads them, and Foxglove's own for its 3D panel. One
-//! module writes, one reads, [`stretches`] are its parts without a gap.
+//! Recordings: an MCAP file whose messages are JSON, so that any MCAP tool reads them, and
+//! Foxglove's own for its 3D panel. One module writes, one reads, [`stretches`] are its parts
+//! without a gap.
 
 mod foxglove;
 mod mcap_repair;

@@ -1,5 +1,5 @@
-//! As much of a damaged recording as can be handed to `mcap`: version 0.26 subtracts without looking where a record runs out of its
-//! chunk, and panics.
+//! As much of a damaged recording as can be handed to `mcap`: version 0.26 subtracts without
+//! looking where a record runs out of its chunk, and panics.
 
 /// Opcode and length of a record.
 const HEAD: usize = 9;
@@ -7,8 +7,8 @@ const CHUNK: u8 = 0x06;
 /// The bytes of a chunk before the name of its compression: times, size, checksum.
 const BEFORE_COMPRESSION: usize = 28;
 
-/// The beginning of an MCAP file, up to the first record that runs out of an uncompressed chunk. Anything else that is wrong with
-/// it stays in.
+/// The beginning of an MCAP file, up to the first record that runs out of an uncompressed chunk.
+/// Anything else that is wrong with it stays in.
 pub(super) fn intact(bytes: &[u8]) -> &[u8] {
     let mut at = mcap::MAGIC.len();
     while let Some((opcode, length)) = head(bytes, at) {
@@ -27,7 +27,8 @@ pub(super) fn intact(bytes: &[u8]) -> &[u8] {
     bytes
 }
 
-/// Returns the offset in an uncompressed chunk, whole or cut, of a record that begins but does not end in it.
+/// Returns the offset in an uncompressed chunk, whole or cut, of a record that begins but does not
+/// end in it.
 fn runs_out(chunk: &[u8]) -> Option<usize> {
     let compression = u32_at(chunk, BEFORE_COMPRESSION)?;
     let begin = BEFORE_COMPRESSION + 4 + 8;
@@ -74,7 +75,8 @@ mod tests {
         [&[opcode][..], &length.to_le_bytes(), content].concat()
     }
 
-    /// A file with a chunk of two records, the second of which says that it is `length` long and has 5 bytes.
+    /// A file with a chunk of two records, the second of which says that it is `length` long and
+    /// has 5 bytes.
     fn file(compression: &str, length: u64) -> Vec<u8> {
         let records = [record(5, 3, b"abc"), record(5, length, b"abcde")].concat();
         let chunk = [

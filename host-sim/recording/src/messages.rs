@@ -1,4 +1,5 @@
-//! The contents of a recording, channel by channel: the frames of the link in decimal numbers, with the unit in the name.
+//! The contents of a recording, channel by channel: the frames of the link in decimal numbers, with
+//! the unit in the name.
 
 use control_core::config::DacWidth;
 use control_core::controller::Sample;
@@ -36,7 +37,8 @@ pub struct Setup {
     pub profile_origin: String,
     /// Name of the scripted procedure, where a hand followed one.
     pub procedure: Option<String>,
-    /// The device's part as it was given, which the configuration can be made from again; none where it was the device's own.
+    /// The device's part as it was given, which the configuration can be made from again; none
+    /// where it was the device's own.
     #[serde(default)]
     pub device_toml: Option<String>,
     /// The tasks that the procedure asks for; none in a recording from before they were told.
@@ -120,7 +122,8 @@ pub struct Pose {
     pub lateral_n: f64,
 }
 
-/// The ultrasound probe on the skin, and how much of the needle its image shows. Only while the page shows the image.
+/// The ultrasound probe on the skin, and how much of the needle its image shows. Only while the
+/// page shows the image.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Probe {
     /// Tick of the newest samples when it came.
@@ -145,7 +148,7 @@ pub struct Link {
     pub garbage: u64,
 }
 
-/// Anything that stands in a recording.
+/// Anything that a recording holds.
 #[derive(Clone, Debug, PartialEq)]
 #[expect(missing_docs, reason = "each variant carries the message that it is named after")]
 pub enum Message {

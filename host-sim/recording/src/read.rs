@@ -1,4 +1,5 @@
-//! Reads a recording, whole or cut short: everything up to the cut is there, and that it was cut is said.
+//! Reads a recording, whole or cut short: everything up to the cut is there, and that it was cut is
+//! said.
 
 use super::mcap_repair::intact;
 use super::messages::{Message, Setup};
@@ -20,7 +21,8 @@ pub struct Recording {
     pub messages: Vec<Message>,
     /// The reason why it ends early, if it does.
     pub cut: Option<String>,
-    /// Time of tick 0 in nanoseconds since 1970, by the clock of the computer that recorded; 0 if that had none.
+    /// Time of tick 0 in nanoseconds since 1970, by the clock of the computer that recorded; 0 if
+    /// that had none.
     pub begun_ns: u64,
 }
 
@@ -36,7 +38,8 @@ fn with_extension(path: &Path) -> Cow<'_, Path> {
 }
 
 impl Recording {
-    /// Reads a recording. A file that was cut is read up to the cut. `monday` is `monday.mcap` unless there is a file of that name.
+    /// Reads a recording. A file that was cut is read up to the cut. `monday` is `monday.mcap`
+    /// unless there is a file of that name.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let path = with_extension(path);
         let shown = path.display().to_string();
@@ -101,7 +104,7 @@ impl Recording {
     }
 }
 
-/// Ticks beyond this are no device's: it would be 28,000 years old.
+/// Ticks beyond this cannot be a device's: it would be 28,000 years old.
 const LATEST_TICK: u64 = 1 << 53;
 
 fn parse(topic: &str, json: &[u8]) -> Result<Option<Message>, String> {
@@ -118,8 +121,10 @@ fn parse(topic: &str, json: &[u8]) -> Result<Option<Message>, String> {
     };
     let message = understood.map_err(|cause| cause.to_string())?;
     match &message {
-        Message::Hello(hello) if !hello.is_plausible() => Err("its scale is no device's".into()),
-        other if other.tick().is_some_and(|tick| tick > LATEST_TICK) => Err("its tick is no device's".into()),
+        Message::Hello(hello) if !hello.is_plausible() => Err("its scale cannot be a device's".into()),
+        other if other.tick().is_some_and(|tick| tick > LATEST_TICK) => {
+            Err("its tick cannot be a device's".into())
+        }
         _ => Ok(Some(message)),
     }
 }

@@ -1,4 +1,5 @@
-//! The totals of a run: samples, punctures, the largest force. It counts exactly the requested number of samples.
+//! The totals of a run: samples, punctures, the largest force. It counts exactly the requested
+//! number of samples.
 
 use crate::messages::Hello;
 use control_core::controller::Sample;

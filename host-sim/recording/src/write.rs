@@ -1,5 +1,6 @@
-//! Writes a recording while it happens. What is on disk can be read at any moment: a chunk is closed every quarter of a
-//! second, so that a full disk, a kill or a power cut cost no more than that.
+//! Writes a recording while it happens. What is on disk can be read at any moment: a chunk is
+//! closed every quarter of a second, so that a full disk, a kill or a power cut cost no more than
+//! that.
 
 use super::foxglove;
 use super::messages::{CHANNELS, Hello, Link, Pose, Probe, Samples, Setup};
@@ -57,7 +58,8 @@ impl Recorder {
         Self::begin(shown, BufWriter::with_capacity(1 << 16, file), setup)
     }
 
-    /// Begins a recording called `name` in the current folder. An older one is never replaced: after `monday` come `monday-2` and so on.
+    /// Begins a recording called `name` in the current folder. An older one is never replaced:
+    /// after `monday` come `monday-2` and so on.
     pub fn create_new(name: &str, setup: &Setup) -> Result<Self, Error> {
         for number in 1..=MOST_OF_A_NAME {
             let shown = if number == 1 { format!("{name}.mcap") } else { format!("{name}-{number}.mcap") };

@@ -1,5 +1,6 @@
-//! The three papers on the virtual device: their procedures are run and recorded, and every figure and number that a paper's text gives
-//! stands on a page beside ours. A module for each paper says what it gives and what we measure; none computes a force of its own.
+//! The three papers on the virtual device: their procedures are run and recorded, and every figure
+//! and number that a paper's text gives is on a page next to ours. A module for each paper says
+//! what it gives and what we measure; none computes a force of its own.
 
 mod measure;
 mod paper_000;
@@ -60,7 +61,8 @@ fn row(what: &str, paper: &str, ours: impl Into<String>, whose: Whose) -> Row {
     Row { what: what.into(), paper: paper.into(), ours: ours.into(), whose }
 }
 
-/// Runs the procedures of `paper` and writes its page and the recordings that it shows to `dir`; the page.
+/// Runs the procedures of `paper` and writes its page and the recordings that it shows to `dir`;
+/// the page.
 pub fn reproduce(paper: Paper, dir: &Path) -> Result<PathBuf, Error> {
     std::fs::create_dir_all(dir).map_err(|cause| {
         Error::input(format_args!(

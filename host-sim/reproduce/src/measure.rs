@@ -1,4 +1,5 @@
-//! The measurements on a recording of a procedure: force over time and depth, what it was before and after a wall gave way.
+//! The measurements on a recording of a procedure: force over time and depth, what it was before
+//! and after a wall gave way.
 
 use control_core::TICK_HZ;
 use device_sim::error::Error;
@@ -73,13 +74,15 @@ impl Trace {
         (0..self.len()).find(|index| self.depth_at(*index) >= depth).unwrap_or(0)
     }
 
-    /// Largest force across the needle that would have held its direction, N; none without a fixture.
+    /// Largest force across the needle that would have held its direction, N; none without a
+    /// fixture.
     pub(super) fn largest_lateral_n(&self, profile: &Profile) -> Option<f64> {
         let judge = Judge::new(profile, &[], self.stretch.first_tick);
         spans(&self.stretch).into_iter().find_map(|span| judge.insertion(span).largest_lateral_n)
     }
 
-    /// Index at which the needle has come to rest after `from`: not a count for a tenth of a second.
+    /// Index at which the needle has come to rest after `from`: not a count for a tenth of a
+    /// second.
     pub(super) fn at_rest(&self, from: usize) -> usize {
         let samples = self.stretch.samples.get(from..).unwrap_or_default();
         let tenth = TICK_HZ as usize / 10;
@@ -96,8 +99,9 @@ impl Trace {
         spans(&self.stretch).into_iter().find_map(|span| judge.insertion(span).target)
     }
 
-    /// Way of the tip in mm, and the force across the needle that would hold its direction of entry, N: `per_rad` for each radian off it,
-    /// up to `most_rad`; from the first contact to the last exit.
+    /// Way of the tip in mm, and the force across the needle that would hold its direction of
+    /// entry, N: `per_rad` for each radian off it, up to `most_rad`; from the first contact to the
+    /// last exit.
     pub(super) fn lateral_over_way(&self, per_rad: f64, most_rad: f64) -> Vec<(f64, f64)> {
         let Some(begin) = self.event(0, is_contact_with(0)) else { return Vec::new() };
         let end = self.event(begin, is_exit_from(0)).unwrap_or_else(|| self.len());
@@ -161,7 +165,8 @@ impl Trace {
         self.depth_at(index)
     }
 
-    /// Returns the force just before a wall gave way at `index`, and the least of the fifth of a second after, N.
+    /// Returns the force just before a wall gave way at `index`, and the least of the fifth of a
+    /// second after, N.
     pub(super) fn fall_n(&self, index: usize) -> (f64, f64) {
         let fifth = TICK_HZ as usize / 5;
         let before = self.largest_n(index.saturating_sub(fifth / 4)..index + 1);

@@ -1,4 +1,5 @@
-//! Paper 000, layered tissue in extended reality: force against depth at its speeds and angles (Fig. 2), and Table 1.
+//! Paper 000, layered tissue in extended reality: force against depth at its speeds and angles
+//! (Fig. 2), and Table 1.
 
 use super::measure::{Trace, is_contact_with, is_puncture_of};
 use super::table_1;
@@ -154,7 +155,8 @@ fn put_table_1(sheet: &mut Sheet) {
     );
 }
 
-/// Returns the depths at which the layers are met and give way on one of the curves, mm along the needle.
+/// Returns the depths at which the layers are met and give way on one of the curves, mm along the
+/// needle.
 fn marks(profile: &Profile, cut: &Cut) -> Vec<(f64, String)> {
     let of = |number: u8, tissue: Tissue| {
         let named = |index: Option<usize>, what: &str| {
@@ -180,7 +182,8 @@ fn largest(cuts: &[Cut], measured: bool) -> Vec<Row> {
     cuts.iter().filter(|cut| cut.is_the_papers() == measured).map(of).collect()
 }
 
-/// Compares fit-force's table of the paper's five cells with the insertions that it was made from, and in a sentence how it tells the other four.
+/// Compares fit-force's table of the paper's five cells with the insertions that it was made from,
+/// and in a sentence how it tells the other four.
 fn fitted(cuts: &[Cut]) -> Result<(Vec<Row>, String), Error> {
     let read = |wanted: bool| -> Result<Vec<_>, Error> {
         let files = cuts.iter().filter(|c| c.is_the_papers() == wanted).map(|c| insertions::read(&c.file));

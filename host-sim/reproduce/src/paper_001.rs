@@ -1,4 +1,5 @@
-//! Paper 001, the roller device for venepuncture: Fig. 5 (the profile of an intravenous injection) and the hold of eq. 2.
+//! Paper 001, the roller device for venepuncture: Fig. 5 (the profile of an intravenous injection)
+//! and the hold of eq. 2.
 
 use super::measure::{Trace, is_puncture_of};
 use super::{Row, Whose, numbers, row};
@@ -124,8 +125,8 @@ fn rows(profile: &Profile, injection: &Trace, cone: &Trace, printed: &Trace) -> 
     Ok(rows)
 }
 
-/// The current that the plant takes for the torque at full scale while a hand holds the needle: with the paper's motor and with the built-in
-/// device's.
+/// The current that the plant takes for the torque at full scale while a hand holds the needle:
+/// with the paper's motor and with the built-in device's.
 fn currents(profile: &Profile) -> Result<String, Error> {
     let device = &profile.config.device;
     let paper = DeviceConfig::read(Path::new("paper-001"))?;

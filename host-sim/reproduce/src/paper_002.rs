@@ -1,4 +1,5 @@
-//! Paper 002, the joint injection simulator: the plateaus of both injections and of the withdrawal (its Fig. 5 and 6).
+//! Paper 002, the joint injection simulator: the plateaus of both injections and of the withdrawal
+//! (its Fig. 5 and 6).
 
 use super::measure::{Trace, is_contact_with, is_exit_from};
 use super::{Row, Whose, numbers, row};
@@ -90,7 +91,8 @@ fn scale(profile: &Profile) -> f64 {
     profile.config.patient.scale.to_num()
 }
 
-/// Friction along the shaft at the injections' 6 mm/s, N: past the Stribeck speed no more than sliding.
+/// Friction along the shaft at the injections' 6 mm/s, N: past the Stribeck speed no more than
+/// sliding.
 fn friction_n(profile: &Profile) -> f64 {
     match &profile.config.patient.law {
         Law::Sparte(law) => {
@@ -165,8 +167,9 @@ fn rows(profile: &Profile, traces: &[Trace]) -> Vec<Row> {
     rows
 }
 
-/// Mean force in the last third of the time between the contact with a layer on the last way in and with the next one, N. In the
-/// innermost it ends before the needle rests, where cutting gives way to sliding.
+/// Mean force in the last third of the time between the contact with a layer on the last way in and
+/// with the next one, N. In the innermost it ends before the needle rests, where cutting gives way
+/// to sliding.
 fn plateau_in(trace: &Trace, layer: u8) -> Option<f64> {
     let deepest = trace.deepest();
     let begin = trace.last_event(deepest, is_contact_with(layer))?;
@@ -175,7 +178,8 @@ fn plateau_in(trace: &Trace, layer: u8) -> Option<f64> {
     trace.mean_n(begin + (end - begin) * 2 / 3..end)
 }
 
-/// Mean force between the exits from the layer below and from this one on the last way out, its first third left out; N.
+/// Mean force between the exits from the layer below and from this one on the last way out, its
+/// first third left out; N.
 fn plateau_out(trace: &Trace, layer: u8) -> Option<f64> {
     let deepest = trace.deepest();
     let end = trace.event(deepest, is_exit_from(layer))?;

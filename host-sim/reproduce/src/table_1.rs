@@ -1,5 +1,5 @@
-//! Paper 000's Table 1 in motion: what pushing to 5 mm does to each configuration of the tissue, and the force where depth counts from
-//! the deformed surface.
+//! Paper 000's Table 1 in motion: what pushing to 5 mm does to each configuration of the tissue,
+//! and the force where depth counts from the deformed surface.
 
 use super::measure::{Trace, is_puncture_of};
 use device_sim::error::Error;

@@ -1,5 +1,6 @@
-//! A TCP listener for axum that takes a limited number of connections and lets go of silent ones: a thousand of them must
-//! not use up the program's file handles, its memory or the time of whoever publishes to each.
+//! A TCP listener for axum that takes a limited number of connections and lets go of silent ones: a
+//! thousand of them must not use up the program's file handles, its memory or the time of whoever
+//! publishes to each.
 
 use axum::serve::Listener;
 use std::io;
@@ -13,7 +14,8 @@ use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio::time::{Instant, Sleep, sleep};
 
-/// A connection on which nothing moves either way for so long is closed. A page or a stream is sent something far more often.
+/// A connection on which nothing moves either way for so long is closed. A page or a stream is sent
+/// something far more often.
 const LONGEST_SILENCE: Duration = Duration::from_secs(30);
 /// After a connection that could not be accepted (no file handles left).
 const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
@@ -44,7 +46,8 @@ impl Listener for BoundedListener {
                 continue;
             };
             let Ok(place) = self.places.clone().try_acquire_owned() else { continue };
-            // Many small messages: each is wanted at once. Without it they come late, and that is all.
+            // Many small messages: each is wanted at once. Without it they come late, and that is
+            // all.
             let _ = stream.set_nodelay(true);
             let silence = self.silence;
             let over = Box::pin(sleep(silence));

@@ -1,5 +1,6 @@
-//! A guide through work that a person and a device do in turns (commissioning, compensation): what comes next, an agreement before
-//! each step, what the device reads meanwhile, what came of it. It shows and waits; it knows no device and moves nothing.
+//! A guide through work that a person and a device do in turns (commissioning, compensation): what
+//! comes next, an agreement before each step, what the device reads meanwhile, what came of it. It
+//! shows and waits; it knows no device and moves nothing.
 
 use crate::visualizer::{Said, Watch, Watches};
 use device_sim::error::Error;
@@ -85,7 +86,8 @@ impl Guide {
         let mut state = self.lock();
         state.answer(answer);
         if state.is_left() {
-            // In the middle of a step: whoever talks to the device ends, and its torque with the heartbeat.
+            // In the middle of a step: whoever talks to the device ends, and its torque with the
+            // heartbeat.
             self.shared.stop.fetch_or(!state.is_ended(), Ordering::Relaxed);
         }
         self.shared.changed.notify_all();

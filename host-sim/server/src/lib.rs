@@ -1,4 +1,5 @@
-//! The outputs and inputs of a running session: the page, other programs' streams, a class, recordings.
+//! The outputs and inputs of a running session: the page, other programs' streams, a class,
+//! recordings.
 
 mod bounded_listener;
 pub mod class;

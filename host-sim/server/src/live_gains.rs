@@ -1,5 +1,6 @@
-//! The share of a device's compensation that is active, adjustable while a person feels the difference. It lasts until the device is configured or restarted:
-//! the stored gains do not change.
+//! The share of a device's compensation that is active, adjustable while a person feels the
+//! difference. It lasts until the device is configured or restarted: the stored gains do not
+//! change.
 
 use control_core::Device;
 use control_core::compensation::{Gain, Gains};

@@ -1,5 +1,6 @@
-//! Whom the needle goes into during a run, and changing it: what a person edits in the page becomes a checked profile, is asked of the
-//! device, and counts once the device has taken it whole. It sends nothing itself.
+//! Whom the needle goes into during a run, and changing it: what a person edits in the page becomes
+//! a checked profile, is asked of the device, and counts once the device has taken it whole. It
+//! sends nothing itself.
 
 use crate::saved_patients::SavedPatients;
 use control_core::{Device, Patient};
@@ -46,7 +47,8 @@ impl PatientManager {
         self
     }
 
-    /// Checks a patient that comes with the program or was saved; what to ask of the device, or in one sentence why not.
+    /// Checks a patient that comes with the program or was saved; what to ask of the device, or in
+    /// one sentence why not.
     pub fn choose(&mut self, name: &str) -> Result<Patient, Error> {
         let profile = Profile::parse_for(self.named(name)?, &self.device)?;
         // It brings its own procedure; the scripted hand must find its way in any.
@@ -54,7 +56,8 @@ impl PatientManager {
         self.ask(profile, own, None)
     }
 
-    /// Checks an edited patient, key by key as in a profile's file; what to ask of the device, or in one sentence why not.
+    /// Checks an edited patient, key by key as in a profile's file; what to ask of the device, or
+    /// in one sentence why not.
     pub fn edit(&mut self, json: &serde_json::Value) -> Result<Patient, Error> {
         let profile = self.edited(json)?;
         self.ask(profile, None, None)
@@ -105,7 +108,8 @@ impl PatientManager {
         Profile::parse_for(Text { origin: "the edited patient".into(), text }, &self.device)
     }
 
-    /// The device has taken what was asked; none if nothing was. A patient that was to be saved is: the file, or why there is none.
+    /// The device has taken what was asked; none if nothing was. A patient that was to be saved is:
+    /// the file, or why there is none.
     pub fn taken(&mut self) -> Option<PatientAnswer> {
         let Asked { mut profile, procedure, save_as } = self.asked.take()?;
         let mut answer = PatientAnswer { taken: true, ..PatientAnswer::default() };
@@ -173,7 +177,8 @@ impl PatientManager {
     }
 }
 
-/// Returns the requested procedure or, if it makes no sense in this patient, the one that the patient's file names.
+/// Returns the requested procedure or, if it makes no sense in this patient, the one that the
+/// patient's file names.
 fn hand(wanted: &str, profile: &Profile) -> Result<Procedure, Error> {
     Procedure::find(wanted, profile)
         .or_else(|cause| Procedure::find(&profile.procedure, profile).map_err(|_| cause))

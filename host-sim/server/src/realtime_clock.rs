@@ -2,10 +2,12 @@
 
 use std::time::{Duration, Instant};
 
-/// Further behind than this (a busy or suspended computer) the clock is set anew rather than caught up with.
+/// Further behind than this (a busy or suspended computer) the clock is set anew rather than caught
+/// up with.
 const LARGEST_LAG: Duration = Duration::from_millis(200);
-/// A device may be this far ahead of the clock on the wall before it waits: waking every millisecond cost a fifth of what it
-/// uses of a core. Not longer than a frame of 32 samples takes to fill.
+/// A device may be this far ahead of the clock on the wall before it waits: waking every
+/// millisecond cost a fifth of what it uses of a core. Not longer than a frame of 32 samples takes
+/// to fill.
 const LARGEST_LEAD: Duration = Duration::from_millis(3);
 
 /// The speed of a simulated device.
@@ -30,8 +32,8 @@ impl RealtimeClock {
         Self::RealTime { zero: Instant::now() }
     }
 
-    /// Waits until it is `elapsed` on the device's own clock, unless that is hardly ahead of the clock on the wall: the next
-    /// call then waits for both.
+    /// Waits until it is `elapsed` on the device's own clock, unless that is hardly ahead of the
+    /// clock on the wall: the next call then waits for both.
     pub fn wait(&mut self, elapsed: Duration) -> Result<(), Late> {
         let Self::RealTime { zero } = self else { return Ok(()) };
         let now = Instant::now();

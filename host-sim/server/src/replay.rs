@@ -1,4 +1,5 @@
-//! A recording in the visualizer, at the pace at which it happened, and from any place of it that a person chooses.
+//! A recording in the visualizer, at the pace at which it happened, and from any place of it that a
+//! person chooses.
 
 use control_core::TICK_HZ;
 use device_sim::session::{Control, Publisher, ReplayStatus};
@@ -30,7 +31,8 @@ pub struct Replay<'a> {
     last_tick: Option<u64>,
     samples: u64,
     frames: u64,
-    /// Time of every message into the recording, in ticks, gaps and new beginnings left out; and all of it.
+    /// Time of every message into the recording, in ticks, gaps and new beginnings left out; and
+    /// all of it.
     times: Vec<u64>,
     length: u64,
 }
@@ -55,7 +57,8 @@ impl<'a> Replay<'a> {
         }
     }
 
-    /// Plays until the end, or for ever where `repeat`; a person stops, starts and moves it in the page. Samples played.
+    /// Plays until the end, or for ever where `repeat`; a person stops, starts and moves it in the
+    /// page. Samples played.
     pub fn run(mut self, repeat: bool) -> u64 {
         while !self.stop.load(Ordering::Relaxed) {
             while let Some(control) = self.publisher.next_control() {
@@ -112,7 +115,8 @@ impl<'a> Replay<'a> {
         self.zero_tick = tick;
     }
 
-    /// Goes on from `at_s` into the recording; whoever looks forgets what was shown and is told what came before.
+    /// Goes on from `at_s` into the recording; whoever looks forgets what was shown and is told
+    /// what came before.
     fn seek(&mut self, at_s: f64) {
         let wanted = (at_s.max(0.0) * f64::from(TICK_HZ)) as u64;
         self.next = self.times.partition_point(|time| *time < wanted);
@@ -192,7 +196,8 @@ fn seconds(ticks: u64) -> f64 {
     ticks as f64 / f64::from(TICK_HZ)
 }
 
-/// Returns the tick from the beginning at which each message is played, never falling, and the whole length.
+/// Returns the tick from the beginning at which each message is played, never falling, and the
+/// whole length.
 fn times(messages: &[Message]) -> (Vec<u64>, u64) {
     let (mut now, mut last) = (0, None);
     let times = messages
@@ -220,10 +225,11 @@ mod tests {
     use serde_json::json;
 
     fn from_json<T: serde::de::DeserializeOwned>(json: serde_json::Value) -> T {
-        serde_json::from_value(json).expect("it stands in recordings like this")
+        serde_json::from_value(json).expect("recordings hold it like this")
     }
 
-    /// A second of poses and blocks from tick 5,000 on with an event in the middle; then the device begins anew.
+    /// A second of poses and blocks from tick 5,000 on with an event in the middle; then the device
+    /// begins anew.
     fn recording() -> Recording {
         let setup: Setup = from_json(json!({
             "program": "", "source": "virtual", "profile_toml": "", "profile_origin": "", "procedure": null

@@ -1,5 +1,6 @@
-//! Joins the two ends: a driver that talks to the device, and everybody who wants what arrives (pages, the recording, the
-//! totals). In step with a simulated device, or in real time over a wire that may be pulled and come back.
+//! Joins the two ends: a driver that talks to the device, and everybody who wants what arrives
+//! (pages, the recording, the totals). In step with a simulated device, or in real time over a wire
+//! that may be pulled and come back.
 
 use crate::outlets::Outlets;
 use crate::patient_manager::PatientManager;
@@ -18,7 +19,8 @@ use training::practice::Practice;
 
 /// A port that could not be opened is tried again after this.
 const RETRY: Duration = Duration::from_millis(300);
-/// The longest single wait for the device: short enough for heartbeats and a quick answer to a person.
+/// The longest single wait for the device: short enough for heartbeats and a quick answer to a
+/// person.
 const PATIENCE: Duration = Duration::from_millis(2);
 /// A device that has never become ready after this is not one.
 const FIRST_ANSWER: Duration = Duration::from_secs(5);
@@ -98,8 +100,9 @@ impl<'a> RunLoop<'a> {
         self
     }
 
-    /// Runs a simulated device in step with it, `clock` saying how fast: the clock of both ends is the device's, so that a
-    /// busy computer slows both and neither finds the other silent. `progress` sees the samples so far, now and then.
+    /// Runs a simulated device in step with it, `clock` saying how fast: the clock of both ends is
+    /// the device's, so that a busy computer slows both and neither finds the other silent.
+    /// `progress` sees the samples so far, now and then.
     pub fn run_in_step(
         mut self,
         mut device: VirtualDevice,
@@ -131,7 +134,8 @@ impl<'a> RunLoop<'a> {
                 on_line.into_iter().for_each(|patients| {
                     device.control(Control::Tilt { rad: patients.profile().tilt_rad() });
                 });
-                // Nobody's hand is on a simulated needle: it goes on as it did, unless a person has stopped it.
+                // Nobody's hand is on a simulated needle: it goes on as it did, unless a person has
+                // stopped it.
                 if !self.person_starts {
                     self.driver.start();
                 }
@@ -147,7 +151,8 @@ impl<'a> RunLoop<'a> {
         self.finish()
     }
 
-    /// Runs the device behind `port` in real time, for at most `seconds`, however often it comes and goes.
+    /// Runs the device behind `port` in real time, for at most `seconds`, however often it comes
+    /// and goes.
     pub fn run_in_real_time(
         mut self,
         port: &mut dyn Port,
@@ -217,7 +222,8 @@ impl<'a> RunLoop<'a> {
         Ok(())
     }
 
-    /// Takes the torque off before the cable is let go; the heartbeat's silence would do it 200 ms later.
+    /// Takes the torque off before the cable is let go; the heartbeat's silence would do it 200 ms
+    /// later.
     fn leave(&mut self, wire: &mut dyn Wire, begin: Instant) {
         self.driver.stop();
         for _ in 0..3 {
@@ -228,7 +234,8 @@ impl<'a> RunLoop<'a> {
         }
     }
 
-    /// The person who started the program asked for a start: once, and not again after a stop or a reconnection.
+    /// The person who started the program asked for a start: once, and not again after a stop or a
+    /// reconnection.
     fn start_once(&mut self, now: Duration) {
         if !self.driver.is_ready(now) {
             self.has_asked = false;
@@ -311,7 +318,8 @@ impl<'a> RunLoop<'a> {
         }
     }
 
-    /// Tells everybody what the device has said to another patient, where it has: whether it has taken it.
+    /// Tells everybody what the device has said to another patient, where it has: whether it has
+    /// taken it.
     fn patient_answer(&mut self) -> Option<bool> {
         let answer = self.driver.take_change()?;
         let patients = self.patients.as_mut()?;

@@ -1,4 +1,5 @@
-//! Patients that people have saved in the page: a TOML file each in one folder, which can be chosen like those of the program.
+//! Patients that people have saved in the page: a TOML file each in one folder, which can be chosen
+//! like those of the program.
 
 use device_sim::error::Error;
 use device_sim::named_files::Text;
@@ -12,7 +13,7 @@ use std::path::{Path, PathBuf};
 const MOST: usize = 200;
 /// Size of the largest file taken, in bytes: an edited patient with all its layers has about 3,000.
 const LARGEST: u64 = 65_536;
-/// Files of one name, told apart by a number.
+/// Files of one name, distinguished by a number.
 const MOST_OF_A_NAME: u32 = 1_000;
 
 /// The folder of the saved patients; it is created with the first.

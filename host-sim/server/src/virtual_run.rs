@@ -1,5 +1,6 @@
-//! A procedure on the virtual device from its beginning to its end, as fast as it goes, recorded: what `reproduce` draws and tests
-//! read. The control core, the link and the recording are those of any other run.
+//! A procedure on the virtual device from its beginning to its end, as fast as it goes, recorded:
+//! what `reproduce` draws and tests read. The control core, the link and the recording are those of
+//! any other run.
 
 use crate::outlets::Outlets;
 use crate::realtime_clock::RealtimeClock;

@@ -16,7 +16,8 @@ use std::sync::atomic::AtomicBool;
 
 /// Make the device run its excitations, with no hand on the needle, and record them at 10 kHz.
 ///
-/// Writes rig.toml (the nominal simulation), fit.csv, fit2.csv and holdout.csv, which `diagnose` reads.
+/// Writes rig.toml (the nominal simulation), fit.csv, fit2.csv and holdout.csv, which `diagnose`
+/// reads.
 #[derive(Args)]
 #[command(after_help = examples!("Examples:
   host-sim characterise --out /tmp/bench3
@@ -27,7 +28,8 @@ pub(crate) struct Characterise {
     /// `virtual`, or the serial port of a device, such as /dev/ttyACM0
     #[arg(long, default_value = "virtual", value_name = "virtual|PATH")]
     device: String,
-    /// The true mechanism of the virtual device: a rig file, with effects that the written rig.toml does not know
+    /// The true mechanism of the virtual device: a rig file, with effects that the written rig.toml
+    /// does not know
     #[arg(long, value_name = "RIG.toml")]
     plant: Option<PathBuf>,
     /// The needle is out: do not ask

@@ -1,4 +1,5 @@
-//! `host-sim commission`: how a device is wired and built, found out before anybody holds its needle.
+//! `host-sim commission`: how a device is wired and built, found out before anybody holds its
+//! needle.
 
 use super::confirm::{Consent, ConsentFlags};
 use clap::Args;
@@ -18,8 +19,8 @@ use std::sync::atomic::AtomicBool;
 
 /// Find out how a device is wired and built, and give it its part of the configuration.
 ///
-/// Announces each step. The motor moves only in the last one, by pulses of at most 2 mN·m. A device refuses to start until
-/// this has passed.
+/// Announces each step. The motor moves only in the last one, by pulses of at most 2 mN·m. A device
+/// refuses to start until this has passed.
 #[derive(Args)]
 #[command(after_help = examples!("Examples:
   host-sim commission

@@ -18,9 +18,10 @@ use std::sync::atomic::AtomicBool;
 
 /// Cancel the device's own forces, as a diagnosis found them, by feedforward.
 ///
-/// Stores cogging, friction, weight, offset, ripple and deadband of the report on the device, which feeds them forward, each
-/// below 100 %. The roller turns slowly before and after; parts that a hand would feel more than before are undone, and
-/// compensation.html shows the mechanism's force on a hand. A weight that the report lacks is measured first.
+/// Stores cogging, friction, weight, offset, ripple and deadband of the report on the device, which
+/// feeds them forward, each below 100 %. The roller turns slowly before and after; parts that a
+/// hand would feel more than before are undone, and compensation.html shows the mechanism's force
+/// on a hand. A weight that the report lacks is measured first.
 #[derive(Args)]
 #[command(after_help = examples!("Examples:
   host-sim characterise --device /dev/ttyACM0 --out bench

@@ -22,7 +22,8 @@ impl Completions {
     pub(crate) fn run(self) -> Result<(), Error> {
         let mut script = Vec::new();
         clap_complete::generate(self.shell, &mut Cli::command(), "host-sim", &mut script);
-        // clap_complete 4.6 takes the hyphen of the program's name for the boundary of a subcommand where bash looks one up.
+        // clap_complete 4.6 takes the hyphen of the program's name for the boundary of a subcommand
+        // where bash looks one up.
         let script = String::from_utf8_lossy(&script).replace("host__subcmd__sim", "host__sim");
         say!("{}", script.trim_end());
         Ok(())

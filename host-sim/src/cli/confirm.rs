@@ -36,7 +36,7 @@ impl ConsentFlags {
         } else {
             None
         };
-        // Nobody stands beside a virtual device.
+        // Nobody is next to a virtual device.
         Ok(Consent { yes: self.yes || device == "virtual", guide })
     }
 }
@@ -53,7 +53,8 @@ impl Consent {
         self.guide.as_ref().map(|(guide, _)| guide.clone())
     }
 
-    /// Announces the next step. Waits for a person to agree if the motor `moves`, and always on a page.
+    /// Announces the next step. Waits for a person to agree if the motor `moves`, and always on a
+    /// page.
     pub(crate) fn ask(&self, step: &dyn Display, moves: bool) -> Result<(), Error> {
         match &self.guide {
             Some((guide, _)) => guide.ask(step, moves),

@@ -10,9 +10,11 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::sync::Mutex;
 
-/// Find where a simulation and its recordings differ and which physics is missing, and prove it on held-out recordings.
+/// Find where a simulation and its recordings differ and which physics is missing, and prove it on
+/// held-out recordings.
 ///
-/// Writes diagnosis.json, report.html, patched-rig.toml and residuals.csv, and prints the same in ten lines.
+/// Writes diagnosis.json, report.html, patched-rig.toml and residuals.csv, and prints the same in
+/// ten lines.
 #[derive(Args)]
 #[command(after_help = examples!("Example:
   host-sim diagnose --rig rig.toml --fit fit.csv --fit fit2.csv --holdout holdout.csv --out /tmp/report"))]
@@ -32,7 +34,8 @@ pub(crate) struct Diagnose {
     /// Folder for the report
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Also write the patched rig for another simulator: mjcf (MuJoCo), urdf or json; may be repeated
+    /// Also write the patched rig for another simulator: mjcf (MuJoCo), urdf or json; may be
+    /// repeated
     #[arg(long, value_name = "mjcf|urdf|json")]
     export: Vec<String>,
 }

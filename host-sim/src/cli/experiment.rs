@@ -9,10 +9,12 @@ use std::path::PathBuf;
 /// The longest input, s.
 const MOST_S: f64 = 30.0;
 
-/// Design the input that best tells the rivals of a diagnosis apart, within limits of travel, speed and force.
+/// Design the input that best tells the rivals of a diagnosis apart, within limits of travel, speed
+/// and force.
 ///
-/// Writes reference.csv for a position loop, command.csv as that loop would send it, predicted.csv with the response of each rival, experiment.json, and
-/// experiment.html, which shows why this input decides. Record it and diagnose again with the recording.
+/// Writes reference.csv for a position loop, command.csv as that loop would send it, predicted.csv
+/// with the response of each rival, experiment.json, and experiment.html, which shows why this
+/// input decides. Record it and diagnose again with the recording.
 #[derive(Args)]
 #[command(after_help = examples!("Example:
   host-sim experiment --report /tmp/report --out /tmp/experiment"))]
@@ -20,7 +22,8 @@ pub(crate) struct Experiment {
     /// The folder that `diagnose` wrote
     #[arg(long, value_name = "DIR")]
     report: PathBuf,
-    /// Largest distance from where the input begins, rad or m (default: the most in the report's recordings)
+    /// Largest distance from where the input begins, rad or m (default: the most in the report's
+    /// recordings)
     #[arg(long, value_name = "RAD|M")]
     travel: Option<f64>,
     /// Largest speed, rad/s or m/s (default: the most in the report's recordings)

@@ -6,11 +6,13 @@ use lab::force_fit::{self, Fit, insertions, page, table::Origin, writer};
 use live::{examples, say};
 use std::path::{Path, PathBuf};
 
-/// Fit the force table of Paper 000, F(depth, speed, angle), to insertions at several speeds and angles.
+/// Fit the force table of Paper 000, F(depth, speed, angle), to insertions at several speeds and
+/// angles.
 ///
-/// Reads recordings of this program (MCAP), or CSV with the columns time_s, depth_mm (along the needle), force_n and angle_deg. It is
-/// judged by the insertions of --holdout; without any, by each insertion in its turn, left out. Writes the table, which a profile's
-/// `[force_table]` takes, and beside it a page that shows measured against fitted.
+/// Reads recordings of this program (MCAP), or CSV with the columns time_s, depth_mm (along the
+/// needle), force_n and angle_deg. It is judged by the insertions of --holdout; without any, by
+/// each insertion in its turn, left out. Writes the table, which a profile's `[force_table]` takes,
+/// and beside it a page that shows measured against fitted.
 #[derive(Args)]
 #[command(after_help = examples!("Example: host-sim fit-force phantom/*.csv --out table.toml"))]
 pub(crate) struct FitForce {

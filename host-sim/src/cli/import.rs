@@ -9,10 +9,11 @@ use std::path::PathBuf;
 
 /// Make rig.toml and CSV files, which `diagnose` reads, from recordings of any other program.
 ///
-/// Reads tables as text (any separator, decimal commas, comments, a row of units, no header, channels in rows), NumPy's .npz,
-/// MATLAB's .mat (not -v7.3), JSON, MCAP with messages in JSON, with `--features ros` ROS 2 bags in MCAP, and with
-/// `--features parquet` Parquet and LeRobot datasets. Says what it took for what, what it changed and what it left out. Values
-/// that no recording tells stand as nan in rig.toml, to be filled in.
+/// Reads tables as text (any separator, decimal commas, comments, a row of units, no header,
+/// channels in rows), NumPy's .npz, MATLAB's .mat (not -v7.3), JSON, MCAP with messages in JSON,
+/// with `--features ros` ROS 2 bags in MCAP, and with `--features parquet` Parquet and LeRobot
+/// datasets. Says what it took for what, what it changed and what it left out. Values that no
+/// recording tells stand as nan in rig.toml, to be filled in.
 #[derive(Args)]
 #[command(after_help = examples!("Examples:
   host-sim import run1.csv run2.csv --out imported
@@ -26,8 +27,9 @@ pub(crate) struct Import {
     /// Folder to write to; created if missing
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// The column of the time, command, position, velocity, reference, tilt or force, and its unit; a minus before the name
-    /// changes the sign, FILE/NAME is a column of one file, and none leaves the role empty
+    /// The column of the time, command, position, velocity, reference, tilt or force, and its unit;
+    /// a minus before the name changes the sign, FILE/NAME is a column of one file, and none leaves
+    /// the role empty
     #[arg(long, value_name = "ROLE=NAME[:UNIT]")]
     column: Vec<String>,
     /// Rows per second, if no column has the time

@@ -20,9 +20,11 @@ use clap::{Parser, Subcommand};
 use device_sim::error::Error;
 use live::examples;
 
-/// The PC side of the needle insertion device: run it (virtual or real), watch it, record it, export and score recordings.
+/// The PC side of the needle insertion device: run it (virtual or real), watch it, record it,
+/// export and score recordings.
 ///
-/// Without a command: a virtual device with a scripted venepuncture, shown at http://127.0.0.1:8710.
+/// Without a command: a virtual device with a scripted venepuncture, shown at
+/// http://127.0.0.1:8710.
 #[derive(Parser)]
 #[command(version = recording::version::version(), after_help = examples!("Example: host-sim run --headless --fast --seconds 60 --record /tmp/a.mcap"))]
 pub(crate) struct Cli {

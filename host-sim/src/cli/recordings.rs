@@ -9,8 +9,8 @@ use std::path::PathBuf;
 
 /// Write rig.toml and CSV files, which `diagnose` reads, from a recording.
 ///
-/// One CSV file (recording.csv), or one for every stretch without a gap (recording-1.csv and so on). Existing files with
-/// these names are replaced.
+/// One CSV file (recording.csv), or one for every stretch without a gap (recording-1.csv and so
+/// on). Existing files with these names are replaced.
 #[derive(Args)]
 #[command(after_help = examples!("Example: host-sim export session.mcap --out exported"))]
 pub(crate) struct Export {

@@ -6,7 +6,8 @@ use live::{examples, say};
 use reproduce::{PAPERS, Paper, reproduce};
 use std::path::PathBuf;
 
-/// Run the papers' procedures on the virtual device and write a page for each, with the paper's numbers and ours.
+/// Run the papers' procedures on the virtual device and write a page for each, with the paper's
+/// numbers and ours.
 #[derive(Args)]
 #[command(after_help = examples!("Example: host-sim reproduce --paper 001 --out papers"))]
 pub(crate) struct Reproduce {

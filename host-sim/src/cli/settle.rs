@@ -28,12 +28,14 @@ enum Source {
     Passive,
 }
 
-/// Let a device settle its own diagnosis: record, diagnose, design the deciding experiment, and record again.
+/// Let a device settle its own diagnosis: record, diagnose, design the deciding experiment, and
+/// record again.
 ///
-/// At most five rounds and three minutes of motion, within the device's ceilings of torque and travel. It ends when one name is left
-/// or nothing tells the rest apart. Then the device feeds forward what was settled, and what a hand feels more than before is taken
-/// back. It writes a folder for each round (recordings, experiment, report), settle.json, settle.html, compensation.html and
-/// device.toml.
+/// At most five rounds and three minutes of motion, within the device's ceilings of torque and
+/// travel. It ends when one name is left or nothing tells the rest apart. Then the device feeds
+/// forward what was settled, and what a hand feels more than before is taken back. It writes a
+/// folder for each round (recordings, experiment, report), settle.json, settle.html,
+/// compensation.html and device.toml.
 #[derive(Args)]
 #[command(after_help = examples!("Examples:
   host-sim settle --plant hidden.toml --out /tmp/settled
@@ -45,7 +47,8 @@ pub(crate) struct Settle {
     /// `virtual`, or the serial port of a device, such as /dev/ttyACM0
     #[arg(long, default_value = "virtual", value_name = "virtual|PATH")]
     device: String,
-    /// The true mechanism of the virtual device: a rig file, with effects that the simulation does not know
+    /// The true mechanism of the virtual device: a rig file, with effects that the simulation does
+    /// not know
     #[arg(long, value_name = "RIG.toml", required_if_eq("device", "virtual"))]
     plant: Option<PathBuf>,
     /// The most rounds, 1 to 5

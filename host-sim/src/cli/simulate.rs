@@ -12,13 +12,14 @@ use diagnosis::simulation::value_fit;
 use live::{examples, say};
 use std::path::{Path, PathBuf};
 
-/// Run the nominal, refitted and patched simulation and compare them with a recording: free run, windows of 0.05 to 5 s, and
-/// under the recorded reference.
+/// Run the nominal, refitted and patched simulation and compare them with a recording: free run,
+/// windows of 0.05 to 5 s, and under the recorded reference.
 ///
-/// Writes simulation.html, simulation.json, and a CSV and an MCAP for each recording (for Foxglove, Rerun and PlotJuggler: the
-/// recording, the simulations and the residuals). Give a rig, or the patched-rig.toml of a report: the
-/// nominal and refitted rigs in the same folder are simulated too. With --fit the values of the last of them are fitted again
-/// to the error of its free run on these recordings, which serves trajectories and is not evidence of physics.
+/// Writes simulation.html, simulation.json, and a CSV and an MCAP for each recording (for Foxglove,
+/// Rerun and PlotJuggler: the recording, the simulations and the residuals). Give a rig, or the
+/// patched-rig.toml of a report: the nominal and refitted rigs in the same folder are simulated
+/// too. With --fit the values of the last of them are fitted again to the error of its free run on
+/// these recordings, which serves trajectories and is not evidence of physics.
 #[derive(Args)]
 #[command(after_help = examples!("Examples:
   host-sim simulate --rig rig.toml --recording holdout.csv --out /tmp/simulated
@@ -33,7 +34,8 @@ pub(crate) struct Simulate {
     /// A recording to fit values to the error of the free run on; may be repeated
     #[arg(long, value_name = "FILE.csv")]
     fit: Vec<PathBuf>,
-    /// Also write the last of the rigs for another simulator: mjcf (MuJoCo), urdf or json; may be repeated
+    /// Also write the last of the rigs for another simulator: mjcf (MuJoCo), urdf or json; may be
+    /// repeated
     #[arg(long, value_name = "mjcf|urdf|json")]
     export: Vec<String>,
     /// Folder for the files
@@ -133,7 +135,8 @@ impl Simulate {
         Ok(())
     }
 
-    /// Returns the notes on the model whose values were fitted by motion from the one called `last`.
+    /// Returns the notes on the model whose values were fitted by motion from the one called
+    /// `last`.
     fn notes_on_fit(&self, last: &str) -> Vec<String> {
         let mut notes = vec![format!(
             "The motion-fitted simulation is the {last} one with the values that bring its free run closest to {}: they serve trajectories, and are no evidence of physics",
@@ -168,7 +171,8 @@ fn read_all(paths: &[PathBuf]) -> Result<Vec<Recording>, Error> {
     paths.iter().map(|path| Recording::read(path).map_err(Error::input)).collect()
 }
 
-/// Returns the names and contents of the files: the page, its figures, and a CSV and an MCAP for each recording.
+/// Returns the names and contents of the files: the page, its figures, and a CSV and an MCAP for
+/// each recording.
 fn files(page: String, compared: &[Comparison], notes: &[String]) -> Result<Vec<(String, Vec<u8>)>, Error> {
     let json =
         serde_json::to_string_pretty(&motion_picture::summary(compared, notes)).map_err(Error::failed)?;

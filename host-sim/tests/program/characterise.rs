@@ -1,5 +1,6 @@
-//! The whole way round: the virtual device has an effect in its mechanism that the written rig does not know; it plays its
-//! excitations over the link, and the diagnosis of the recordings names the effect.
+//! The whole way round: the virtual device has an effect in its mechanism that the written rig does
+//! not know; it plays its excitations over the link, and the diagnosis of the recordings names the
+//! effect.
 
 use control_core::event::State;
 use control_core::excitation::{Excitation, Servo, Signal};
@@ -98,7 +99,8 @@ fn steps_without_a_prompt_play_as_one_sequence() {
     assert_eq!(played, 18_000, "1.8 s without a tick of rest");
     let after = track.samples[played..].iter().filter(|sample| sample.state != State::Idle as u8).count();
     assert_eq!(after, 0, "and nothing after it");
-    // The reference that is written down is the one that the motor followed: it goes on where it was.
+    // The reference that is written down is the one that the motor followed: it goes on where it
+    // was.
     let hello = characterise::scale(&characterise::configuration()).expect("sound");
     let mm_per_count = hello.mm_per_count;
     let begin = f64::from(track.samples[0].count);

@@ -1,5 +1,6 @@
-//! A class over Zenoh, on loopback: devices and their instructor come, go and come back; a stalled instructor, a wrong token
-//! and a server that never answers cost nobody anything. Runs where the feature `class` is built: `cargo xtask nightly class`.
+//! A class over Zenoh, on loopback: devices and their instructor come, go and come back; a stalled
+//! instructor, a wrong token and a server that never answers cost nobody anything. Runs where the
+//! feature `class` is built: `cargo xtask nightly class`.
 
 use crate::common::{figure, folder, host_sim, refused, run, text};
 use control_core::Device;
@@ -160,7 +161,8 @@ fn a_stalled_instructor_and_a_mute_server_hold_up_nothing() {
     let run = crate::common::paced::run(publisher, crate::common::paced::End::After(3), true);
     check("a mute server", &run);
 
-    // An instructor's program that is stopped in the middle of it all: its sockets stay open and nobody reads.
+    // An instructor's program that is stopped in the middle of it all: its sockets stay open and
+    // nobody reads.
     let stalled = meeting("stalled", None);
     let at = stalled.address.to_string();
     let mut instructor = host_sim(&["class", "stalled", "--listen", &at, "--port", "0"]);
@@ -202,8 +204,9 @@ fn cpu_s(pid: u32) -> f64 {
     (ticks(11) + ticks(12)) / 100.0
 }
 
-/// Programs and their instructor's, each with a virtual device at 10 kHz and 1,000 poses a second: the CPU time in s that all of
-/// them take in some seconds, those seconds, and the poses that each sends in one of them.
+/// Programs and their instructor's, each with a virtual device at 10 kHz and 1,000 poses a second:
+/// the CPU time in s that all of them take in some seconds, those seconds, and the poses that each
+/// sends in one of them.
 #[cfg(target_os = "linux")]
 fn measured(members: usize) -> (f64, f64, f64) {
     const SECONDS: f64 = 10.0;
@@ -228,8 +231,8 @@ fn measured(members: usize) -> (f64, f64, f64) {
     (cpu, seconds, rate)
 }
 
-/// One, ten and thirty devices with their instructor, all of it within one core. Prints the row of `cargo xtask nightly class`, and
-/// for `cargo xtask bench` the CPU time of each class.
+/// One, ten and thirty devices with their instructor, all of it within one core. Prints the row of
+/// `cargo xtask nightly class`, and for `cargo xtask bench` the CPU time of each class.
 #[cfg(target_os = "linux")]
 #[test]
 #[ignore = "measures: needs a machine that does nothing else, `cargo xtask nightly class` runs it"]

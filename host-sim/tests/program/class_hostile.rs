@@ -1,6 +1,7 @@
-//! Programs that mean harm, against the instructor's listener of a class: noise, endless frames, silence, nonsense on the class'
-//! keys, a flood. The page stays up, a device's control path is never late, memory stays bounded. Runs where the feature
-//! `class` is built: `cargo xtask nightly class`.
+//! Programs that mean harm, against the instructor's listener of a class: noise, endless frames,
+//! silence, nonsense on the class' keys, a flood. The page stays up, a device's control path is
+//! never late, memory stays bounded. Runs where the feature `class` is built: `cargo xtask nightly
+//! class`.
 
 use crate::common::host_sim;
 use control_core::Device;
@@ -15,7 +16,8 @@ use zenoh::{Config, Session, Wait};
 
 const ATTACK_S: u64 = 8;
 const SILENT: usize = 200;
-/// The most that the instructor's program may hold, MiB: 200 devices at 64 KiB a message, and its threads.
+/// The most that the instructor's program may hold, MiB: 200 devices at 64 KiB a message, and its
+/// threads.
 const MOST_MEMORY_MIB: u64 = 256;
 const PAGE_PATIENCE: Duration = Duration::from_secs(2);
 
@@ -44,7 +46,8 @@ fn instructor(meeting: &Meeting) -> (Child, SocketAddr) {
     (child, page.expect("it says where its page is"))
 }
 
-/// Connections that send noise, or the length of a frame and only half of it; held open for a moment each.
+/// Connections that send noise, or the length of a frame and only half of it; held open for a
+/// moment each.
 fn send_noise(at: SocketAddr, stop: &AtomicBool) -> u64 {
     let mut connections = 0;
     // Zenoh's frames begin with two bytes of length: the longest that there is, and never whole.
@@ -78,7 +81,8 @@ fn stranger(meeting: &Meeting) -> Session {
     zenoh::open(config).wait().expect("the listener takes it")
 }
 
-/// Publishes until `stop`: what `message` gives for a number, as key after the class and bytes. Returns how many.
+/// Publishes until `stop`: what `message` gives for a number, as key after the class and bytes.
+/// Returns how many.
 fn publish(
     meeting: &Meeting,
     stop: &AtomicBool,
@@ -100,7 +104,8 @@ fn publish(
     let _ = session.close().wait();
 }
 
-/// Nonsense of every kind, now and then far more than a message may have, under names that there are and are not.
+/// Nonsense of every kind, now and then far more than a message may have, under names that there
+/// are and are not.
 fn garbage(number: u64) -> (String, Vec<u8>) {
     let kind = ["pose", "event", "score", "about", "orders"][number as usize % 5];
     let device = ["bed-1".to_string(), format!("x{number}"), "x".repeat(60)][number as usize % 3].clone();

@@ -268,7 +268,8 @@ fn killed_recordings_are_readable_interrupted_ones_complete() {
     }
 }
 
-/// A computer that is too busy for the program slows the virtual device and its PC alike: nobody went silent.
+/// A computer that is too busy for the program slows the virtual device and its PC alike: nobody
+/// went silent.
 #[cfg(unix)]
 #[test]
 fn a_program_that_stands_still_for_a_while_goes_on_where_it_was() {

@@ -1,5 +1,6 @@
-//! `compensate` on the virtual device, whose mechanism has forces that only the diagnosis has found. Both rigs are those that
-//! the tests on the board use; `docs/compensation.md` has the commands that made them.
+//! `compensate` on the virtual device, whose mechanism has forces that only the diagnosis has
+//! found. Both rigs are those that the tests on the board use; `docs/compensation.md` has the
+//! commands that made them.
 
 use control_core::Device;
 use control_core::compensation::Gain;

@@ -1,4 +1,5 @@
-//! From insertions to a force table on the command line: Paper 000's experiment with a truth that is known.
+//! From insertions to a force table on the command line: Paper 000's experiment with a truth that
+//! is known.
 
 use crate::common::{figure, folder, refused, run, run_well, text};
 use control_core::controller::Sample;
@@ -7,12 +8,14 @@ use recording::stretches::stretches;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-/// A layer of the phantom: where it begins, mm, its stiffness, N/mm^1.5, and the energy that it takes to tear it, N·mm.
+/// A layer of the phantom: where it begins, mm, its stiffness, N/mm^1.5, and the energy that it
+/// takes to tear it, N·mm.
 const LAYERS: [(f64, f64, f64); 2] = [(0.0, 0.30, 0.62), (4.2, 0.55, 0.55)];
 
-/// A phantom by another law than the table's: each layer stores elastic energy, F = k·δ^1.5, and tears when that reaches the energy
-/// of a crack. Faster is stiffer (logarithm) and tougher (root), so that a layer tears at another depth, too; what has torn falls off
-/// exponentially, and the shaft rubs.
+/// A phantom by another law than the table's: each layer stores elastic energy, F = k·δ^1.5, and
+/// tears when that reaches the energy of a crack. Faster is stiffer (logarithm) and tougher (root),
+/// so that a layer tears at another depth, too; what has torn falls off exponentially, and the
+/// shaft rubs.
 struct Phantom {
     speed: f64,
     angle_deg: f64,
@@ -55,7 +58,8 @@ impl Phantom {
     }
 }
 
-/// The reading of a six-axis sensor of 12 N: white noise of 8 mN, mains of 3 mN, a drift of 5 mN, steps of 3 mN.
+/// The reading of a six-axis sensor of 12 N: white noise of 8 mN, mains of 3 mN, a drift of 5 mN,
+/// steps of 3 mN.
 struct Sensor {
     random: u64,
 }
@@ -79,7 +83,8 @@ impl Sensor {
     }
 }
 
-/// An insertion and a withdrawal at an even speed, 500 rows a second, as a phantom's test stand writes them.
+/// An insertion and a withdrawal at an even speed, 500 rows a second, as a phantom's test stand
+/// writes them.
 fn insertion(dir: &Path, speed: f64, angle: f64, take: u64) -> PathBuf {
     let mut csv = String::from("time_s,depth_mm,force_n,angle_deg\n");
     let mut sensor = Sensor { random: 44_001 + 97 * take + (1_000.0 * speed + angle) as u64 };
@@ -219,7 +224,8 @@ fn a_written_table_meets_a_phantoms_peaks_within_3_percent() {
             assert!((at - tears).abs() < 0.06, "{v} mm/s, {a}°: at {at} mm, not {tears} mm");
         }
     }
-    // What the header says is what this file leaves of the insertions that it was judged by: evaluated here, point by point.
+    // What the header says is what this file leaves of the insertions that it was judged by:
+    // evaluated here, point by point.
     let squares: Vec<f64> = (unseen.iter().zip(takes(10)))
         .map(|(file, (v, a, _))| {
             let csv = std::fs::read_to_string(file).expect("written above");
@@ -239,7 +245,8 @@ fn a_written_table_meets_a_phantoms_peaks_within_3_percent() {
     let left = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
     let told = figure(&said, "unseen_rms_n");
     assert!((told / left - 1.0).abs() < 0.1, "{told} N reported, {left} N left by the file");
-    // Specimens tear at depths that differ; off the tears little more than the sensor's noise is left.
+    // Specimens tear at depths that differ; off the tears little more than the sensor's noise is
+    // left.
     assert!(told < 0.06, "{told} N");
     assert!(figure(&said, "worst_peak_percent") < 10.0, "{said}");
 }

@@ -1,5 +1,5 @@
-//! The force–depth curve of every profile, recomputed in floating point from the profile's own TOML, against the torque in an
-//! exported CSV: within one step of the converter, sample by sample.
+//! The force–depth curve of every profile, recomputed in floating point from the profile's own
+//! TOML, against the torque in an exported CSV: within one step of the converter, sample by sample.
 
 use crate::common::{figure, folder, run_well, text};
 use std::path::Path;
@@ -48,8 +48,8 @@ fn top_mm(layer: &toml::Value) -> f64 {
     number(layer, &["depth_mm"]) / ANGLE_RAD.sin()
 }
 
-/// The tissue of a profile, as the README of any such device would describe it. Every wall has given way long before the
-/// next one is met.
+/// The tissue of a profile, as the README of any such device would describe it. Every wall has
+/// given way long before the next one is met.
 struct Twin {
     layers: Vec<toml::Value>,
     given: Vec<Option<f64>>,

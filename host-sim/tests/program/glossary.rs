@@ -105,7 +105,7 @@ fn the_glossary_has_every_refusal_and_verdict() {
     for refusal in refusals {
         let row = table.iter().find(|row| row.starts_with(&format!("| {} |", called(refusal))));
         let row = row.unwrap_or_else(|| panic!("{refusal:?}"));
-        // What to do stands last in the sentence, and is the same where it holds no figures.
+        // What to do comes last in the sentence, and is the same where it holds no figures.
         let said = refusal.to_string();
         if let Some((_, advice)) =
             said.rsplit_once("; ").filter(|(_, advice)| !advice.contains(|c: char| c.is_ascii_digit()))

@@ -1,4 +1,5 @@
-//! The commands of docs/diagnosis.md and docs/training.md, run as they stand there, and what the guide says that they print.
+//! The commands of docs/diagnosis.md and docs/training.md, run as they stand there, and what the
+//! guide says that they print.
 
 use crate::common::{folder, text};
 use diagnosis::rig::Rig;
@@ -43,7 +44,7 @@ fn blocks(guide: &str, heading: &str) -> Vec<String> {
 /// Runs a block of commands in a folder that stands for /tmp too; what they print.
 fn run_in(dir: &Path, commands: &str) -> String {
     let program = Path::new(env!("CARGO_BIN_EXE_host-sim"));
-    let programs = program.parent().expect("it lies in a folder");
+    let programs = program.parent().expect("it is in a folder");
     let path = format!("{}:{}", text(programs), std::env::var("PATH").unwrap_or_default());
     let script = commands.replace("/tmp/", &format!("{}/", text(dir)));
     let output = Command::new("sh")

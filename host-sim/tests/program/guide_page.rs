@@ -1,5 +1,5 @@
-//! The guide in the page: it waits for a person before each step, takes nonsense for nothing, shows what came of it, and ends where
-//! the person or the program does.
+//! The guide in the page: it waits for a person before each step, takes nonsense for nothing, shows
+//! what came of it, and ends where the person or the program does.
 
 use device_sim::error::Error;
 use serde_json::{Value, json};
@@ -55,7 +55,7 @@ fn a_step_begins_when_the_page_says_so_and_not_before() {
     guide.read(Reading { counts: 4_000, tilt_deg: 30.0 });
     let now = told(&guide);
     assert_eq!((&now["steps"][0]["stage"], &now["reading"]["counts"]), (&json!("running"), &json!(4_000)));
-    // The agreement to one step is none to the next.
+    // An agreement to one step does not cover the next.
     let asking = {
         let guide = guide.clone();
         thread::spawn(move || guide.ask(&"the motor moves", true))

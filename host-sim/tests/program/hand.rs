@@ -35,7 +35,8 @@ fn a_dragged_needle_meets_the_parabola_and_stays_when_released() {
     run(&mut device, 1.0);
     assert_eq!(device.tripped(), None);
     let depth = device.plant().tip() * 1e3;
-    // T²/9 against a hand of 1 N/mm that is 2.6 − T ahead, and as much as the needle weighs: T is near 2.13 mm.
+    // T²/9 against a hand of 1 N/mm that is 2.6 − T ahead, and as much as the needle weighs: T is
+    // near 2.13 mm.
     let expected = depth * depth / 9.0;
     assert!((1.9..2.4).contains(&depth), "{depth} mm");
     assert!((resistance_n(&device) - expected).abs() < 0.02, "{} N at {depth} mm", resistance_n(&device));

@@ -1,5 +1,6 @@
-//! Clients that mean harm, against every listener of a running device: floods, frames of impossible sizes, silence, thousands
-//! of connections. The control path must not notice, and torque must stay off. `class.rs` does the same to a class.
+//! Clients that mean harm, against every listener of a running device: floods, frames of impossible
+//! sizes, silence, thousands of connections. The control path must not notice, and torque must stay
+//! off. `class.rs` does the same to a class.
 
 use server::streams::{self, Kind, Spec};
 use server::visualizer;
@@ -52,7 +53,8 @@ fn endless_frame() -> Vec<u8> {
     bytes
 }
 
-/// An OpenIGTLink header that says its body has 2^63 bytes, and the first quarter of a megabyte of it.
+/// An OpenIGTLink header that says its body has 2^63 bytes, and the first quarter of a megabyte of
+/// it.
 fn endless_body() -> Vec<u8> {
     let mut bytes = vec![0; 58];
     bytes[1] = 1;
@@ -62,8 +64,8 @@ fn endless_body() -> Vec<u8> {
     bytes
 }
 
-/// Everything at once, again and again; connections are held until the next round. Every listener has its round, however long
-/// that takes, and what each round connected is counted.
+/// Everything at once, again and again; connections are held until the next round. Every listener
+/// has its round, however long that takes, and what each round connected is counted.
 fn attack(listeners: &[(SocketAddr, &str)]) -> Vec<usize> {
     let begin = Instant::now();
     let mut rounds = Vec::new();

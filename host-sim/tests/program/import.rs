@@ -1,5 +1,5 @@
-//! Recordings that other programs wrote, and what `import` makes of them. tests/foreign/make.py wrote them; the motion in all of
-//! them is the one of [`angle`] and [`torque`].
+//! Recordings that other programs wrote, and what `import` makes of them. tests/foreign/make.py
+//! wrote them; the motion in all of them is the one of [`angle`] and [`torque`].
 
 use crate::common::{folder, host_sim, run_well, text};
 use diagnosis::recording::Recording;
@@ -52,7 +52,8 @@ fn import_with_rig(files: &[&str], options: &[&str]) -> (String, Vec<Recording>,
     (said, recordings, rig)
 }
 
-/// That a recording holds the motion, from `begin` s on, within `close` rad and with its torque times `gain`.
+/// That a recording holds the motion, from `begin` s on, within `close` rad and with its torque
+/// times `gain`.
 fn holds_the_motion(recording: &Recording, per_unit: f64, begin: f64, gain: f64, close: f64) {
     let zero = recording.position_counts[0] / per_unit - angle(begin);
     for ((t, u), counts) in recording.time_s.iter().zip(&recording.command).zip(&recording.position_counts) {
@@ -185,7 +186,7 @@ fn damaged_hdf5_is_refused_or_read_and_never_panics() {
     let file = out.join("damaged.h5");
     for i in 0..200 {
         let mut damaged = whole.clone();
-        // The structure stands in the first part; cut the file now and then.
+        // The structure is in the first part; cut the file now and then.
         damaged[8 + (i * 37) % 6000] ^= 1 << (i % 8);
         damaged.truncate(if i % 5 == 0 { whole.len() * (i + 1) / 201 } else { whole.len() });
         std::fs::write(&file, &damaged).expect("written");

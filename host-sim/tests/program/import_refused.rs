@@ -1,4 +1,5 @@
-//! Files and options that `import` refuses, each with the sentence and the option that it says then.
+//! Files and options that `import` refuses, each with the sentence and the option that it says
+//! then.
 
 use crate::common::{folder, host_sim, text};
 use crate::import::{angle, foreign};

@@ -1,4 +1,5 @@
-//! The torque when the link fails: silence, a pulled cable, lost and damaged bytes, a PC that comes back.
+//! The torque when the link fails: silence, a pulled cable, lost and damaged bytes, a PC that comes
+//! back.
 
 use device_sim::device::virtual_device::VirtualDevice;
 use device_sim::driver::Driver;

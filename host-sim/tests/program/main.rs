@@ -1,4 +1,5 @@
-//! The tests of the program and of the crates behind it, in one program: one link instead of twenty-four.
+//! The tests of the program and of the crates behind it, in one program: one link instead of
+//! twenty-four.
 
 mod acceptance;
 mod characterise;

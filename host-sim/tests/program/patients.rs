@@ -1,4 +1,5 @@
-//! The patient is changed while the device runs: taken whole or refused with the reason, told to the page and to the recording.
+//! The patient is changed while the device runs: taken whole or refused with the reason, told to
+//! the page and to the recording.
 
 use crate::common::folder;
 use control_core::Device;
@@ -20,7 +21,8 @@ use server::run_loop::RunLoop;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-/// Runs an adult on `device` for `seconds`; at the first progress `wanted` is chosen. The patient manager assumes the built-in device.
+/// Runs an adult on `device` for `seconds`; at the first progress `wanted` is chosen. The patient
+/// manager assumes the built-in device.
 fn run(device: &Device, wanted: &str, seconds: u64, file: &Path) -> Subscription {
     let profile = Profile::find_for("adult", device).expect("it is built in");
     let believed = Profile::find("adult").expect("it is built in");

@@ -1,4 +1,5 @@
-//! The plant against mechanics on paper: energy, terminal speed, slip above the grip, weight, sameness.
+//! The plant against mechanics on paper: energy, terminal speed, slip above the grip, weight,
+//! sameness.
 
 use device_sim::device::device_config::DeviceConfig;
 use device_sim::plant::bearing::Bearing;
@@ -32,7 +33,8 @@ fn without_friction_energy_is_kept_and_with_it_never_gained() {
     for tick in 0..20_000 {
         plant.tick(0.0, false, Some((0.002, 0.0)));
         let now = total(&plant);
-        // Symplectic steps let the stored energy ripple by the step times the fastest pole; it may not grow.
+        // Symplectic steps let the stored energy ripple by the step times the fastest pole; it may
+        // not grow.
         assert!(now <= before + 2e-3 * begin, "tick {tick}: {now} J after {before} J");
         before = now.min(before);
     }
@@ -51,7 +53,8 @@ fn a_free_roller_settles_where_friction_balances_the_torque() {
     assert!((plant.speed() / expected - 1.0).abs() < 1e-3, "{} rad/s, on paper {expected}", plant.speed());
 }
 
-/// Paper 001: 24 V, 0.6 A, 28.8 mN·m. The hand holds the needle, and the amplifier gives all that it has.
+/// Paper 001: 24 V, 0.6 A, 28.8 mN·m. The hand holds the needle, and the amplifier gives all that
+/// it has.
 #[test]
 fn the_papers_motor_takes_its_current_for_its_torque() {
     let part = DeviceConfig::read(Path::new("paper-001")).expect("it comes with the program");
@@ -90,7 +93,8 @@ fn the_needle_slips_above_the_grip_and_not_below_it() {
     assert!(slip < 1e-4 && force > 1.5, "held: {slip} m at {force} N");
     let (slip, force) = pull(1.0, 2.0);
     assert!((force - 1.0).abs() < 0.02, "it slips at the grip's 1 N, not at {force} N");
-    // The hand is 2 mm ahead and a millimetre stretched; of the other one the loop that stands in for a wall yields a tenth.
+    // The hand is 2 mm ahead and a millimetre stretched; of the other one the loop that stands in
+    // for a wall yields a tenth.
     assert!((0.8e-3..1e-3).contains(&slip), "the hand's other millimetre is slip: {slip} m");
 }
 

@@ -1,4 +1,5 @@
-//! Recordings that are damaged, cut or made of several sessions: read as far as they go, never a panic.
+//! Recordings that are damaged, cut or made of several sessions: read as far as they go, never a
+//! panic.
 
 use crate::common::{folder, run_well, text};
 use control_core::controller::Sample;

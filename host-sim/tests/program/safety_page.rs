@@ -1,4 +1,5 @@
-//! docs/safety.md and docs/diagnosis-design.md name tests and CONTRIBUTING.md files: each is where it says.
+//! docs/safety.md and docs/diagnosis-design.md name tests and CONTRIBUTING.md files: each is where
+//! it says.
 
 use std::path::{Path, PathBuf};
 
@@ -7,7 +8,8 @@ fn quoted(line: &str) -> impl Iterator<Item = &str> {
     line.split('`').skip(1).step_by(2)
 }
 
-/// The names of tests in a line, each with its file: the one before it in the line, or else `of_table`.
+/// The names of tests in a line, each with its file: the one before it in the line, or else
+/// `of_table`.
 fn named<'a>(line: &'a str, of_table: Option<&'a str>) -> Vec<(&'a str, &'a str)> {
     let mut file = of_table;
     let mut out = Vec::new();

@@ -1,4 +1,5 @@
-//! `settle`, on the virtual device and over a port: the rounds, the use of what was settled, and a person who ends it.
+//! `settle`, on the virtual device and over a port: the rounds, the use of what was settled, and a
+//! person who ends it.
 
 use crate::common::folder;
 use device_sim::device::{Port, Wire};
@@ -51,7 +52,8 @@ fn what_was_settled_is_fed_forward_and_the_hand_feels_less() {
     }
 }
 
-/// A device with a mechanism behind a port. It moves on only while its wire is read, and no faster than a clock.
+/// A device with a mechanism behind a port. It moves on only while its wire is read, and no faster
+/// than a clock.
 struct Behind(Arc<Mutex<BareDevice>>);
 
 impl Port for Behind {
@@ -69,7 +71,8 @@ struct Cable {
     since: Instant,
 }
 
-/// Ticks between two readings at most, so that a slow computer makes a slow device and not a silent one.
+/// Ticks between two readings at most, so that a slow computer makes a slow device and not a silent
+/// one.
 const BURST: u64 = 50;
 
 impl Wire for Cable {

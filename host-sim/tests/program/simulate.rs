@@ -1,4 +1,5 @@
-//! `simulate` as a person meets it: what it says first, what a fit by motion brings and costs, the files.
+//! `simulate` as a person meets it: what it says first, what a fit by motion brings and costs, the
+//! files.
 
 use crate::common::{folder, refused, run, run_well, text};
 use diagnosis::rig::Rig;

@@ -1,4 +1,5 @@
-//! The live streams against clients by hand; `tests/clients` holds the independent ones from package registries.
+//! The live streams against clients by hand; `tests/clients` holds the independent ones from
+//! package registries.
 
 use control_core::units::{Millimetres, Milliradians};
 use device_sim::session::{self, Publisher, Scene, SceneNeedle, Source};
@@ -103,7 +104,8 @@ fn a_slow_client_gets_the_newest_pose_and_no_queue_of_old_ones() {
     std::thread::sleep(Duration::from_millis(100));
     let (first, _) = message(&mut stream).expect("a message");
     assert_eq!(first, "STATUS");
-    // As many as 60 a second are since then, each with at most one status, and not one for each pose.
+    // As many as 60 a second are since then, each with at most one status, and not one for each
+    // pose.
     let most = 4 + 2 * 60 * (begin.elapsed().as_millis() as usize) / 1_000;
     let last = (0..most).find_map(|_| {
         let (kind, body) = message(&mut stream).expect("a message");

@@ -45,7 +45,8 @@ fn a_venepuncture_is_scored_and_debriefed() {
     refused(&run(&["debrief", "/no/such.mcap", "--out", text(&out)]), 2, &["/no/such.mcap"]);
 }
 
-/// A needle driven through the far wall and beside the patient's angle, against the scripted venepuncture.
+/// A needle driven through the far wall and beside the patient's angle, against the scripted
+/// venepuncture.
 #[test]
 fn a_trainee_is_compared_with_an_expert() {
     let (novice, _) = scored("novice", &["--seconds", "6", "--procedure", "insertion-5mms-60deg"]);
@@ -123,8 +124,8 @@ fn a_needle_that_goes_through_and_one_that_is_turned_are_told() {
     assert_eq!(redirected[0]["vessel"], Value::Bool(true));
 }
 
-/// The phantom's vessel gives way at 4.8 mm and its bottom skin at 8.0 mm under the skin; the needle goes to 10 mm, waits there for half
-/// a second, and comes out.
+/// The phantom's vessel gives way at 4.8 mm and its bottom skin at 8.0 mm under the skin; the
+/// needle goes to 10 mm, waits there for half a second, and comes out.
 #[test]
 fn a_table_that_ruptures_is_scored_like_any_other() {
     let arguments = ["--profile", "phantom", "--procedure", "insertion-5mms-60deg", "--seconds", "6.5"];
@@ -134,7 +135,8 @@ fn a_table_that_ruptures_is_scored_like_any_other() {
         (&one["punctures"], &one["vessel"], &one["through_far_wall"]),
         (&3.into(), &true.into(), &true.into())
     );
-    // In: from 4.8 to 8.0 mm at 5 mm/s along 60°. Out: 10 mm in 3 s, smoothly, through the lumen between 7 and 4 mm in half a second.
+    // In: from 4.8 to 8.0 mm at 5 mm/s along 60°. Out: 10 mm in 3 s, smoothly, through the lumen
+    // between 7 and 4 mm in half a second.
     let in_s = (8.0 - 4.8) / 60.0_f64.to_radians().sin() / 5.0;
     let in_lumen_s = one["in_lumen_s"].as_f64().expect("a number");
     assert!((in_s + 0.4..in_s + 0.8).contains(&in_lumen_s), "{in_lumen_s} s, {in_s} s of it on the way in");
@@ -183,7 +185,8 @@ fn a_turned_needle_is_scored_by_the_patients_fixture() {
     assert_eq!((&adult[0]["barriers"], &adult[0]["largest_lateral_n"]), (&Value::from(0), &Value::Null));
 }
 
-/// Paper 002, IV: in at 37° the needle passes the bursa where it does not reach; drawn back and turned to 45° it comes to it.
+/// Paper 002, IV: in at 37° the needle passes the bursa where it does not reach; drawn back and
+/// turned to 45° it comes to it.
 #[test]
 fn the_first_injection_misses_the_bursa_and_then_reaches_it() {
     let injection = |procedure: &str| {
@@ -341,7 +344,8 @@ fn the_papers_are_reproduced_each_on_its_own_law() {
     refused(&run(&["reproduce", "--paper", "7", "--out", text(&dir)]), 2, &["000, 001 or 002"]);
 }
 
-/// The scripted injection into the bursa, and three that a teacher would stop: injected first, injected before the bursa, not aspirated.
+/// The scripted injection into the bursa, and three that a teacher would stop: injected first,
+/// injected before the bursa, not aspirated.
 #[test]
 fn tasks_are_recorded_and_scored() {
     let good = include_str!("../../procedures/bursa.toml");

@@ -1,5 +1,6 @@
-//! A trainee's insertions while they happen, judged by the same code as a recording: the samples of an insertion are kept
-//! until the needle has left the skin, and then scored as `host-sim score` scores them.
+//! A trainee's insertions while they happen, judged by the same code as a recording: the samples of
+//! an insertion are kept until the needle has left the skin, and then scored as `host-sim score`
+//! scores them.
 
 use crate::score::{Insertion, Judge, Span, spans};
 use control_core::TICK_HZ;
@@ -11,7 +12,8 @@ use link::frames::EventKind;
 use recording::messages::Hello;
 use recording::stretches::Stretch;
 
-/// Samples kept while the needle is outside: an event may be told a moment before or after its samples. 0.5 s.
+/// Samples kept while the needle is outside: an event may be told a moment before or after its
+/// samples. 0.5 s.
 const OUTSIDE: usize = TICK_HZ as usize / 2;
 /// An insertion that takes longer than five minutes is left to the recording.
 const LONGEST: usize = 300 * TICK_HZ as usize;
@@ -48,7 +50,8 @@ impl LiveScore {
         ended
     }
 
-    /// Takes what has arrived and shows each insertion that has ended with it to `see`, with its figures.
+    /// Takes what has arrived and shows each insertion that has ended with it to `see`, with its
+    /// figures.
     pub(crate) fn take_each(&mut self, batch: &Batch, see: impl FnMut(Span<'_>, Insertion)) {
         if let Some(hello) = &batch.hello {
             let hello = Hello::from(hello);
@@ -94,7 +97,8 @@ impl LiveScore {
     }
 }
 
-/// Adds a sample. After a gap the insertion begins anew: one with a hole in it has no score, as in a recording.
+/// Adds a sample. After a gap the insertion begins anew: one with a hole in it has no score, as in
+/// a recording.
 fn append(stretch: &mut Stretch, tick: u64, sample: Sample) {
     if stretch.end_tick() != tick || stretch.samples.len() >= LONGEST {
         stretch.samples.clear();
@@ -104,7 +108,7 @@ fn append(stretch: &mut Stretch, tick: u64, sample: Sample) {
     stretch.samples.push(sample);
 }
 
-/// Forgets what was before `tick`, which lies in the stretch or at its end.
+/// Forgets what was before `tick`, which is in the stretch or at its end.
 fn begin_at(stretch: &mut Stretch, tick: u64) {
     let gone = (tick - stretch.first_tick) as usize;
     stretch.samples.drain(..gone.min(stretch.samples.len()));

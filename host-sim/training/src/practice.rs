@@ -1,5 +1,5 @@
-//! Practice: each insertion of a run is judged as soon as the needle has left the skin, by the code that judges recordings, against
-//! what its patient is for. What was judged goes to the pages.
+//! Practice: each insertion of a run is judged as soon as the needle has left the skin, by the code
+//! that judges recordings, against what its patient is for. What was judged goes to the pages.
 
 use crate::live_score::LiveScore;
 use crate::score::Insertion;
@@ -13,7 +13,8 @@ use serde::Serialize;
 
 /// The tip has to rest in the vein for so long: blood is drawn, or a cannula put in.
 const IN_LUMEN_S: f64 = 0.5;
-/// An angle further off than this, root mean square along the way, is not the patient's any more, °.
+/// An angle further off than this, root mean square along the way, is not the patient's any more,
+/// °.
 const ANGLE_WITHIN_DEG: f64 = 5.0;
 /// Places a second of the way that a page draws.
 const PATH_HZ: f64 = 25.0;
@@ -105,7 +106,8 @@ pub struct Attempt {
     pub number: u32,
     /// Name of the patient.
     pub patient: String,
-    /// True if a person held the needle when it ended; otherwise the scripted hand did, or nobody knows.
+    /// True if a person held the needle when it ended; otherwise the scripted hand did, or nobody
+    /// knows.
     pub by_person: bool,
     /// True if it has reached the goal.
     pub reached: bool,

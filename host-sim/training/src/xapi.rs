@@ -1,5 +1,5 @@
-//! Insertions as statements of the Experience API 1.0.3 (xAPI), which a learning record store takes as a JSON array. A statement has no
-//! `id`: the store adds one.
+//! Insertions as statements of the Experience API 1.0.3 (xAPI), which a learning record store takes
+//! as a JSON array. A statement has no `id`: the store adds one.
 
 use crate::practice::Goal;
 use crate::score::{Insertion, each};
@@ -17,8 +17,8 @@ const SIMULATION: &str = "http://adlnet.gov/expapi/activities/simulation";
 /// Names of our own are URNs: nothing is served for them.
 const OURS: &str = "urn:needle-insertion:";
 
-/// Returns a statement for each insertion: passed or failed, how long it took, the figures of `score`, and what was missing. `e_mail` is
-/// the trainee's.
+/// Returns a statement for each insertion: passed or failed, how long it took, the figures of
+/// `score`, and what was missing. `e_mail` is the trainee's.
 pub fn statements(recording: &Recording, by: Option<&Profile>, e_mail: &str) -> Result<Vec<Value>, Error> {
     let actor = actor(e_mail)?;
     let mut statements = Vec::new();
@@ -92,7 +92,8 @@ fn extensions(figures: &Insertion, missing: &[String]) -> Map<String, Value> {
     extensions
 }
 
-/// A name as a part of a URN: other characters than letters, digits, `-`, `.` and `_` are percent-encoded.
+/// A name as a part of a URN: other characters than letters, digits, `-`, `.` and `_` are
+/// percent-encoded.
 fn in_urn(name: &str) -> String {
     let encode = |byte: u8| match byte {
         b'a'..=b'z' | b'A'..=b'Z' | b'0'..=b'9' | b'-' | b'.' | b'_' => char::from(byte).to_string(),

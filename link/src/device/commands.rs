@@ -41,7 +41,8 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
         if result != Err(CommandRefusal::Full) {
             self.answered.write(ack);
         }
-        // Where the PC floods faster than it reads, an ack is lost: it asks again and is answered again.
+        // Where the PC floods faster than it reads, an ack is lost: it asks again and is answered
+        // again.
         let _ = self.waiting.borrow_mut().acks.push_back(ack);
     }
 
@@ -140,7 +141,8 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
         Ok(())
     }
 
-    /// A person has started the device, and has been told what ended its last run. A sequence that still waits is not what was wanted.
+    /// A person has started the device, and has been told what ended its last run. A sequence that
+    /// still waits is not what was wanted.
     pub(super) fn will_power_up(&mut self) {
         self.start_ordered = true;
         self.fault = None;
@@ -161,7 +163,8 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
         self.interlocks.first().map_or(Ok(()), |interlock| Err(CommandRefusal::Interlocked(interlock)))
     }
 
-    /// A patient for another device leaves; what is wrong with the device itself is wrong without a patient too.
+    /// A patient for another device leaves; what is wrong with the device itself is wrong without a
+    /// patient too.
     fn configure_device(&mut self, device: &Device) -> Result<(), CommandRefusal> {
         self.identity.ceilings.check(device).map_err(CommandRefusal::Config)?;
         let plan = Plan::new(device, self.plan.patient())

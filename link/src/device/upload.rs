@@ -1,4 +1,5 @@
-//! The sequence that a PC uploads before it plays it. It belongs to the session, and nothing starts by it.
+//! The sequence that a PC uploads before it plays it. It belongs to the session, and nothing starts
+//! by it.
 
 use super::{Endpoint, Waiting};
 use crate::codec;
@@ -8,7 +9,8 @@ use control_core::excitation::{Excitation, Prepared, Sequence, SequenceRefusal};
 use control_core::{LargeOrder, Plan, TICK_HZ};
 use core::borrow::BorrowMut;
 
-/// A sequence is played at once or not at all: this many ticks after its first segment it is forgotten.
+/// A sequence is played at once or not at all: this many ticks after its first segment it is
+/// forgotten.
 pub const LATE_TICKS: u64 = 10 * TICK_HZ as u64;
 
 /// A sequence and the tick at which its first segment came.

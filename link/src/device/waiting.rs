@@ -10,7 +10,8 @@ const WAITING_EVENTS: usize = 32;
 const WAITING_ACKS: usize = 16;
 const WAITING_ORDERS: usize = 4;
 
-/// The messages that wait for the PC or for the control law. It is large, and may be built in its final place.
+/// The messages that wait for the PC or for the control law. It is large, and may be built in its
+/// final place.
 pub struct Waiting {
     pub(super) acks: Deque<Ack, WAITING_ACKS>,
     pub(super) events: Deque<Event, WAITING_EVENTS>,

@@ -104,14 +104,16 @@ fn a_body_is_drawn_cut_and_imaged() {
         all.dedup();
         all
     };
-    // Skin, fat, muscle, bursa, tendon and cartilage are cut; bursa, tendon and cartilage are bodies of their own.
+    // Skin, fat, muscle, bursa, tendon and cartilage are cut; bursa, tendon and cartilage are
+    // bodies of their own.
     assert_eq!(tissues(Kind::Section), [0, 1, 2, 4, 5, 6]);
     assert_eq!(tissues(Kind::InsideBehind), [4, 5, 6]);
     for step in 0..120 {
         picture.step(1.0 / 60.0, -2.0 + step as f32 * 0.05, 0.785);
     }
     assert!(picture.points().iter().flatten().all(|number| number.abs() < 400.0), "it holds together");
-    // Bone reflects: straight down from over the humerus the image is bright at its depth, and dark where there is only muscle.
+    // Bone reflects: straight down from over the humerus the image is bright at its depth, and dark
+    // where there is only muscle.
     picture.hold_probe(25.0, 0.0, 0.0, 0.0);
     let brightest = picture.image(0.1, 0.0).iter().copied().max();
     assert!(brightest > Some(150), "{brightest:?}");
@@ -133,7 +135,8 @@ fn the_skin_is_met_where_one_looks_and_turns_with_the_limb() {
 
 #[test]
 fn a_vein_on_the_line_gives_way_at_the_devices_word() {
-    // Straight down on the shoulder's vein, 39 degrees around at 30 mm along; its layers: skin, fat, vein, fat.
+    // Straight down on the shoulder's vein, 39 degrees around at 30 mm along; its layers: skin,
+    // fat, vein, fat.
     let mut numbers = vec![4.0];
     for (kind, depth, travel) in [(0.0, 0.0, 1.2), (1.0, 2.5, -1.0), (7.0, 4.2, -1.0), (1.0, 7.2, -1.0)] {
         numbers.extend([kind, depth, travel, 0.0]);

@@ -1,5 +1,6 @@
-//! One estimate for all baselines: position on an even grid, low-passed without phase, differenced twice. Every column of a
-//! rival's library goes through the same low-pass, so that both sides of an equation see the same filter.
+//! One estimate for all baselines: position on an even grid, low-passed without phase, differenced
+//! twice. Every column of a rival's library goes through the same low-pass, so that both sides of
+//! an equation see the same filter.
 
 use crate::generator::case::Case;
 use crate::generator::simulate;
@@ -85,7 +86,8 @@ pub(crate) fn table(case: &Case, k: usize) -> Table {
     Table { rows, kept, rate: rate / step as f64, band, independent }
 }
 
-/// Returns counts, commands, tilt and force of a recording at `n` points of an even grid from `start` (s) on, `rate` a second.
+/// Returns counts, commands, tilt and force of a recording at `n` points of an even grid from
+/// `start` (s) on, `rate` a second.
 fn on_even_grid(source: &[simulate::Row], start: f64, rate: f64, n: usize) -> [Vec<f64>; 4] {
     let columns: [fn(&simulate::Row) -> f64; 4] = [|r| r.counts, |r| r.command, |r| r.tilt, |r| r.force];
     let mut even: [Vec<f64>; 4] = Default::default();

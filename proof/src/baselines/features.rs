@@ -1,4 +1,5 @@
-//! The library of the baselines that select: columns linear in their coefficients, each with the contract's name for it.
+//! The library of the baselines that select: columns linear in their coefficients, each with the
+//! contract's name for it.
 
 use std::f64::consts::TAU;
 
@@ -24,7 +25,8 @@ pub(crate) struct Feature {
     value: Column,
 }
 
-/// The columns of recording `k` (`usize::MAX`: the held-out one) at the kept rows: one vector a column, low-passed.
+/// The columns of recording `k` (`usize::MAX`: the held-out one) at the kept rows: one vector a
+/// column, low-passed.
 pub(crate) fn columns(features: &[Feature], k: usize, table: &Table) -> Vec<Vec<f64>> {
     features
         .iter()
@@ -76,8 +78,8 @@ impl Builder {
     }
 }
 
-/// The columns for a case; the nominal ones first. Target: acceleration, as in sparse identification: a command as target
-/// would be explained by functions of the command.
+/// The columns for a case; the nominal ones first. Target: acceleration, as in sparse
+/// identification: a command as target would be explained by functions of the command.
 pub(crate) fn library(case: &Case, tables: &[Table]) -> Vec<Feature> {
     let all = || tables[..2].iter().flat_map(|t| t.rows.iter());
     let top = all().map(|r| r.speed.abs()).fold(1e-12, f64::max);
@@ -124,7 +126,8 @@ fn put_nominal(b: &mut Builder, case: &Case) {
     }
 }
 
-/// Friction laws and drifts; `top` is the largest speed, in u/s, and `travel` the largest travel, in u.
+/// Friction laws and drifts; `top` is the largest speed, in u/s, and `travel` the largest travel,
+/// in u.
 fn put_friction(b: &mut Builder, case: &Case, top: f64, travel: f64) {
     b.one("asymmetric_friction", |r| r.speed.abs());
     for share in [0.02, 0.05, 0.1, 0.2] {

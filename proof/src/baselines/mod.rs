@@ -1,5 +1,7 @@
-//! Methods without the tool, on the same files: refit only, forward selection by BIC, sparse regression, a score
-//! test without opponents, an unstructured residual model, and a fit that knows the whole structure. Each is written in the straightforward way, on one common estimate of the motion.
+//! Methods without the tool, on the same files: refit only, forward selection by BIC, sparse
+//! regression, a score test without opponents, an unstructured residual model, and a fit that knows
+//! the whole structure. Each is written in the straightforward way, on one common estimate of the
+//! motion.
 
 mod estimate;
 mod features;
@@ -21,7 +23,8 @@ pub(crate) struct Opinion {
     pub(crate) rival: usize,
     /// Names in the contract's words, three at most; empty for baselines that name nothing.
     pub(crate) names: Vec<&'static str>,
-    /// Held-out gain over an oracle's at the baselines' bandwidth; `None` where there is nothing to gain.
+    /// Held-out gain over an oracle's at the baselines' bandwidth; `None` where there is nothing to
+    /// gain.
     pub(crate) share: Option<f64>,
 }
 
@@ -43,8 +46,8 @@ pub(crate) const BASELINES: [Baseline; 6] = [
     Baseline { name: "unstructured", names: false },
 ];
 
-/// The fit that has been told the whole structure, by the judge's inverse dynamics; none where there is nothing to gain, or
-/// the effect has no law with few enough numbers.
+/// The fit that has been told the whole structure, by the judge's inverse dynamics; none where
+/// there is nothing to gain, or the effect has no law with few enough numbers.
 pub(crate) fn known_structure(bench: &Result<Bench, String>, key: &Key) -> Option<Opinion> {
     if !matches!(key.category, Category::Single | Category::Pair | Category::Triple) {
         return None;
@@ -102,7 +105,8 @@ pub(crate) fn judge(case: &Case) -> [Opinion; 5] {
 /// Less than this part of the refit's mean square left to an oracle, and there is nothing to gain.
 const EXPLAINABLE: f64 = 0.05;
 
-/// Share of what an oracle, which has the true model and leaves the noise, takes off the held-out mean square.
+/// Share of what an oracle, which has the true model and leaves the noise, takes off the held-out
+/// mean square.
 fn share_of_oracle(refit: f64, left: f64, oracle: f64) -> Option<f64> {
     let all = refit - oracle;
     let gain = refit - left;
@@ -139,7 +143,8 @@ fn point(row: &estimate::Row) -> [f64; 3] {
     [row.place, row.speed, row.command]
 }
 
-/// Bayesian information criterion with the rows counted as independent only at the residual bandwidth.
+/// Bayesian information criterion with the rows counted as independent only at the residual
+/// bandwidth.
 fn bic(residual: f64, rows: usize, independent: f64, parameters: usize) -> f64 {
     independent * (residual / rows.max(1) as f64).max(1e-300).ln() + parameters as f64 * independent.ln()
 }
@@ -155,7 +160,8 @@ fn forward_bic(
     let mut best = normal.solve(&active, &[]);
     let mut score = bic(normal.residual(&best), normal.rows, independent, active.len());
     let groups: usize = features.iter().map(|f| f.group).max().unwrap_or(0) + 1;
-    // Several groups may carry the same name (harmonics): three names at most, eight groups at most.
+    // Several groups may carry the same name (harmonics): three names at most, eight groups at
+    // most.
     for _ in 0..8 {
         let mut step: Option<(f64, Vec<usize>, Vec<f64>, &'static str)> = None;
         for group in 0..groups {
@@ -183,8 +189,8 @@ fn forward_bic(
     (best, names)
 }
 
-/// Sequentially thresholded least squares (Brunton, Proctor, Kutz 2016) on columns of unit rms; the threshold is the one of
-/// a grid with the best BIC.
+/// Sequentially thresholded least squares (Brunton, Proctor, Kutz 2016) on columns of unit rms; the
+/// threshold is the one of a grid with the best BIC.
 fn thresholding(
     features: &[Feature],
     normal: &Normal,

@@ -1,6 +1,6 @@
-//! A score test for every candidate in turn, and no test against other explanations: no rival, no free form, no
-//! held-out recording. The variance of a score is the scatter of its blocks with the candidate in the model, so that
-//! autocorrelated noise counts once.
+//! A score test for every candidate in turn, and no test against other explanations: no rival, no
+//! free form, no held-out recording. The variance of a score is the scatter of its blocks with the
+//! candidate in the model, so that autocorrelated noise counts once.
 
 use super::estimate::Table;
 use super::features::Feature;
@@ -86,7 +86,8 @@ fn score(
     ((statistic / k).max(0.0).cbrt() - 1.0 + part) / part.sqrt()
 }
 
-/// The standard normal number that is exceeded with probability `p` (Abramowitz and Stegun 26.2.23).
+/// The standard normal number that is exceeded with probability `p` (Abramowitz and Stegun
+/// 26.2.23).
 fn normal_quantile(p: f64) -> f64 {
     let t = (-2.0 * p.ln()).sqrt();
     t - (2.515_517 + t * (0.802_853 + t * 0.010_328))

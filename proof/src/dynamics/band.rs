@@ -31,7 +31,8 @@ impl Band {
         Self { filters_hz: oracle.filters_hz, skip_s: oracle.skip_s, kept, motion }
     }
 
-    /// A force of every row, in the band, at the rows that are judged. Rows at rest pass as nothing.
+    /// A force of every row, in the band, at the rows that are judged. Rows at rest pass as
+    /// nothing.
     pub(super) fn see(&self, force: impl Fn(usize) -> f64) -> Vec<f64> {
         self.filter(|i| if self.motion.rest[i] { 0.0 } else { force(i) })
     }
@@ -53,7 +54,8 @@ impl Band {
         self.motion.time[self.motion.len() - 1] - self.skip_s
     }
 
-    /// Acceleration, speed, direction, weight and measured load, as they stand on the left-hand side of the equation.
+    /// Acceleration, speed, direction, weight and measured load, as they stand on the left-hand
+    /// side of the equation.
     pub(super) fn nominal_columns(&self) -> Vec<Vec<f64>> {
         let m = &self.motion;
         vec![
@@ -72,14 +74,15 @@ impl Band {
     }
 }
 
-/// Time after a rest or a reversal in which the filters still tell of it, and before, over the inverse of their corner.
+/// Time after a rest or a reversal in which the filters still tell of it, and before, over the
+/// inverse of their corner.
 const SETTLING: f64 = 1.0;
 const AHEAD: f64 = 0.1;
 /// At least this part of the moving rows is judged, however often the motion turns round.
 const LEAST: f64 = 0.2;
 
-/// Rows that are judged: they move, and the filters have settled since the last rest or reversal, where the direction of
-/// friction is not sure to a row.
+/// Rows that are judged: they move, and the filters have settled since the last rest or reversal,
+/// where the direction of friction is not sure to a row.
 fn settled(m: &Motion, corner_hz: f64, skip_s: f64) -> Vec<usize> {
     let n = m.len();
     let moving: Vec<usize> = (0..n).filter(|&i| m.time[i] > skip_s && !m.rest[i]).collect();
@@ -99,8 +102,8 @@ fn settled(m: &Motion, corner_hz: f64, skip_s: f64) -> Vec<usize> {
 /// Nominal values: inertia, viscosity, dry friction, weight, and the measured load's.
 pub(super) const NOMINAL: usize = 5;
 
-/// Mean and standard deviation of each nominal value; a deviation of zero where there is no such term. The gain stays, for a
-/// common scale of everything cannot be seen.
+/// Mean and standard deviation of each nominal value; a deviation of zero where there is no such
+/// term. The gain stays, for a common scale of everything cannot be seen.
 pub(super) fn prior(rig: &Rig) -> ([f64; NOMINAL], [f64; NOMINAL]) {
     let gain = rig.sigma("gain", EASY);
     let mut means = [rig.inertia, 0.0, 0.0, 0.0, 1.0];

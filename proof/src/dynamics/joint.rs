@@ -1,8 +1,9 @@
-//! A second mass behind a gap, a grip or a spring, as a patched rig parametrises it: what a rigid machine misses of it, by
-//! the command and the motor's motion.
+//! A second mass behind a gap, a grip or a spring, as a patched rig parametrises it: what a rigid
+//! machine misses of it, by the command and the motor's motion.
 //!
-//! With the shares of inertia 1/(1+r) and r/(1+r), drive D/J = d, friction f and forces p on the whole, per inertia, the
-//! motor's lead over its load follows w″ = (1+r)·(d − y) − …, where y is what the joint carries.
+//! With the shares of inertia 1/(1+r) and r/(1+r), drive D/J = d, friction f and forces p on the
+//! whole, per inertia, the motor's lead over its load follows w″ = (1+r)·(d − y) − …, where y is
+//! what the joint carries.
 
 use std::f64::consts::TAU;
 
@@ -72,7 +73,8 @@ impl Joint {
         }
     }
 
-    /// Command that moves the motor alone, mean over the row: the term that `inertia_ratio` multiplies.
+    /// Command that moves the motor alone, mean over the row: the term that `inertia_ratio`
+    /// multiplies.
     pub(crate) fn term(&mut self, at: &Instant) -> f64 {
         let drive = at.command * self.per_command;
         let [mut lead, mut rate] = self.lead.unwrap_or([drive.signum() * self.half_gap, 0.0]);
@@ -112,7 +114,8 @@ impl Joint {
     }
 }
 
-/// Part of its ceiling that a rolling contact carries, by its creep over half the creep at which all of it slides (Carter).
+/// Part of its ceiling that a rolling contact carries, by its creep over half the creep at which
+/// all of it slides (Carter).
 fn traction(creep: f64) -> f64 {
     if creep.abs() < 2.0 { creep - 0.25 * creep * creep.abs() } else { creep.signum() }
 }

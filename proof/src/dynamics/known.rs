@@ -1,6 +1,7 @@
-//! The fit of somebody who has been told the whole structure: nominal values, coefficients and shapes of the hidden effects
-//! together, least squares over the fit recordings in the oracle's band, as one would write it with SciPy or MuJoCo's
-//! system identification. It names nothing; its held-out gain is what a tool that names can be measured by.
+//! The fit of somebody who has been told the whole structure: nominal values, coefficients and
+//! shapes of the hidden effects together, least squares over the fit recordings in the oracle's
+//! band, as one would write it with SciPy or MuJoCo's system identification. It names nothing; its
+//! held-out gain is what a tool that names can be measured by.
 
 use super::band::{Band, NOMINAL, prior};
 use super::laws::{effective_command, forces};
@@ -14,7 +15,8 @@ use crate::signal::Normal;
 const GRID: usize = 5;
 const STEPS: usize = 24;
 
-/// The search range of a shape's parameter: (name, lowest, highest), both positive, even in the logarithm.
+/// The search range of a shape's parameter: (name, lowest, highest), both positive, even in the
+/// logarithm.
 type Axis = (&'static str, f64, f64);
 
 /// The form of an effect to fit.
@@ -93,7 +95,8 @@ fn form(name: &str, rig: &Rig, key: &Key, bands: &[Band]) -> Result<Form, String
     })
 }
 
-/// The orders of an effect that is periodic in the turn: the key's, or the first where there can be no other.
+/// The orders of an effect that is periodic in the turn: the key's, or the first where there can be
+/// no other.
 fn orders(name: &str, key: &Key) -> Result<Vec<f64>, String> {
     let told = key.parameters.iter().filter(|p| p.effect == name);
     let orders: Vec<f64> = told.filter_map(|p| p.name.strip_prefix("order_")?.parse().ok()).collect();
@@ -106,13 +109,15 @@ fn orders(name: &str, key: &Key) -> Result<Vec<f64>, String> {
     Ok(vec![1.0])
 }
 
-/// The rig with the fitted values and effects, and what it leaves of the fit recordings in mean square.
+/// The rig with the fitted values and effects, and what it leaves of the fit recordings in mean
+/// square.
 struct Fitted {
     rig: Rig,
     cost: f64,
 }
 
-/// Returns the residual of the fit with the whole structure on the held-out recording, and its inertia.
+/// Returns the residual of the fit with the whole structure on the held-out recording, and its
+/// inertia.
 ///
 /// # Errors
 /// An effect that nothing is fitted to.
@@ -197,8 +202,9 @@ fn fit_at(
     Ok(Fitted { rig: fitted, cost: normal.residual(&moved) / normal.rows.max(1) as f64 })
 }
 
-/// Adds a recording's rows to the normal equations: drive force less that of the nominal values, against the nominal terms, the
-/// effects' coefficients and the recording's offset in column `offset`.
+/// Adds a recording's rows to the normal equations: drive force less that of the nominal values,
+/// against the nominal terms, the effects' coefficients and the recording's offset in column
+/// `offset`.
 fn add_recording(
     normal: &mut Normal,
     rig: &Rig,

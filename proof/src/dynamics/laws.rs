@@ -1,6 +1,8 @@
-//! The force of a patched rig's effects along a recording: the sum of coefficient times term for every row.
+//! The force of a patched rig's effects along a recording: the sum of coefficient times term for
+//! every row.
 //!
-//! Periodic terms along the travel are separate: encoder zeros differ between recordings, so their phase is found for each.
+//! Periodic terms along the travel are separate: encoder zeros differ between recordings, so their
+//! phase is found for each.
 
 use std::f64::consts::TAU;
 
@@ -312,7 +314,8 @@ fn profile<'a>(entry: &'a Entry, along: f64, what: fn(&Motion, usize) -> f64) ->
     }))
 }
 
-/// Bristles in place of the dry friction that the rig has: Dahl's for one length, Maxwell slip for a spread of them.
+/// Bristles in place of the dry friction that the rig has: Dahl's for one length, Maxwell slip for
+/// a spread of them.
 fn bristles(entry: &Entry) -> Term<'_> {
     const ELEMENTS: usize = 6;
     let (middle, spread) = (entry.shape("deflection", 1.0), entry.shape("spread", 1.0));

@@ -1,5 +1,6 @@
-//! The judge's own inverse dynamics: what a rig, refitted or patched, leaves of the force on a recording. It reads the files
-//! of the contract (`rig.toml`, recordings, `patched-rig.toml`) and neither the report's numbers nor the tool's code.
+//! The judge's own inverse dynamics: what a rig, refitted or patched, leaves of the force on a
+//! recording. It reads the files of the contract (`rig.toml`, recordings, `patched-rig.toml`) and
+//! neither the report's numbers nor the tool's code.
 
 mod band;
 mod joint;

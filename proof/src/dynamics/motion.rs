@@ -1,4 +1,5 @@
-//! Rows of a recording on an even grid: position between the stamps by a cubic, commands as they were held.
+//! Rows of a recording on an even grid: position between the stamps by a cubic, commands as they
+//! were held.
 
 use super::recording::Recording;
 use crate::signal::low_pass;
@@ -9,8 +10,9 @@ pub(crate) struct Motion {
     /// From the first row, s.
     pub(crate) time: Vec<f64>,
     pub(crate) rate: f64,
-    /// Second derivative of the travel as it was read, not filtered; at rest, less what is seen of it in the band of the laws:
-    /// nothing is known of the forces there, and to cut the noise of the counts would bring it down into the band.
+    /// Second derivative of the travel as it was read, not filtered; at rest, less what is seen of
+    /// it in the band of the laws: nothing is known of the forces there, and to cut the noise of
+    /// the counts would bring it down into the band.
     pub(crate) acceleration: Vec<f64>,
     /// Travel and speed, low-passed for the laws that need them.
     pub(crate) place: Vec<f64>,
@@ -21,16 +23,18 @@ pub(crate) struct Motion {
     pub(crate) command: Vec<f64>,
     pub(crate) tilt: Vec<f64>,
     pub(crate) force: Vec<f64>,
-    /// The row cannot be judged: too slow for a direction, or so near to a reversal that the low-passed speed does not tell it.
+    /// The row cannot be judged: too slow for a direction, or so near to a reversal that the
+    /// low-passed speed does not tell it.
     pub(crate) rest: Vec<bool>,
 }
 
 /// Slower than this part of the recording's rms speed is at rest.
 const SLOWEST: f64 = 0.01;
-/// The time over which a low-pass smears a reversal to either side, relative to the inverse of its corner.
+/// The time over which a low-pass smears a reversal to either side, relative to the inverse of its
+/// corner.
 const SMEARED: f64 = 0.35;
 
-/// Rows of which one lies so many before or after that has something about it.
+/// Rows that are so many before or after one that has something about it.
 pub(crate) fn widened(n: usize, before: usize, after: usize, has: impl Fn(usize) -> bool) -> Vec<bool> {
     let mut wide = vec![false; n];
     let mut until = 0;

@@ -4,7 +4,8 @@ use super::band::{Band, spread};
 use super::laws::{Forces, effective_command, forces, is_along_travel, is_over};
 use super::rig::Rig;
 
-/// Encoder zeros that are tried along the shortest wave, and along the spread of starts to either side.
+/// Encoder zeros that are tried along the shortest wave, and along the spread of starts to either
+/// side.
 const PHASES: f64 = 24.0;
 const PLACES: i32 = 8;
 /// Encoder zeros that are tried round a turn for a table over the angle.
@@ -62,7 +63,8 @@ pub(super) fn left(nominal: &Rig, patched: &Rig, band: &Band) -> Result<f64, Str
     Ok(best)
 }
 
-/// Second moments of what is left and the columns of the waves, so that a shift costs no pass over the rows.
+/// Second moments of the residual and the columns of the waves, so that a shift costs no pass over
+/// the rows.
 struct Sums {
     rows: f64,
     energy: f64,
@@ -87,7 +89,7 @@ impl Sums {
         }
     }
 
-    /// Rms of what is left once the weighted columns are added.
+    /// Rms of the residual once the weighted columns are added.
     fn left(&self, weights: &[f64]) -> f64 {
         let mut total = self.energy;
         for (i, a) in weights.iter().enumerate() {

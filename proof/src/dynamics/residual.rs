@@ -1,8 +1,9 @@
-//! Force errors on the held-out recording, worked out from the files alone: a refit of the nominal structure by least
-//! squares, and the patched rig as it stands.
+//! Force errors on the held-out recording, worked out from the files alone: a refit of the nominal
+//! structure by least squares, and the patched rig as it is.
 //!
-//! Both sides of the equation of motion go through the filters of the key's oracle. What is a nuisance of each recording is
-//! found on it: its bias, where the rig allows one, and where the encoder's zero stands against what is periodic.
+//! Both sides of the equation of motion go through the filters of the key's oracle. What is a
+//! nuisance of each recording is found on it: its bias, where the rig allows one, and the encoder's
+//! zero against what is periodic.
 
 use std::path::{Path, PathBuf};
 
@@ -43,7 +44,8 @@ impl Bench {
         Ok(Self { rig, fits, held, floor: oracle.floor, truth })
     }
 
-    /// Rms that the refitted nominal structure leaves on the held-out recording, N·m or N in the scale of the true inertia.
+    /// Rms that the refitted nominal structure leaves on the held-out recording, N·m or N in the
+    /// scale of the true inertia.
     pub(crate) fn refit(&self) -> f64 {
         let values = refit(&self.rig, &self.fits, self.floor);
         values.left(&self.rig, &self.held) * self.truth / values.means[0]

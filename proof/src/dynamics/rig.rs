@@ -7,7 +7,8 @@ use toml::Value;
 /// Numbers by name.
 pub(crate) type Numbers = BTreeMap<String, f64>;
 
-/// A force over one or two variables: straight between its places, level beyond its ends, the last variable fastest.
+/// A force over one or two variables: straight between its places, level beyond its ends, the last
+/// variable fastest.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Table {
     pub(crate) over: Vec<String>,

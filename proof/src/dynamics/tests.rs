@@ -1,4 +1,5 @@
-//! The judge's inverse dynamics against cases whose truth is at hand: the true model leaves the noise.
+//! The judge's inverse dynamics against cases whose truth is at hand: the true model leaves the
+//! noise.
 
 use std::fmt::Write as _;
 
@@ -10,8 +11,8 @@ use crate::generator::spec::Spec;
 use crate::key::Category;
 use crate::report_residuals::Left;
 
-/// A case of the effect on a machine whose stamps are true and that does not creep: of one that does, so few rows lie away
-/// from a reversal that they are not like the others.
+/// A case of the effect on a machine whose stamps are true and that does not creep: of one that
+/// does, so few rows lie away from a reversal that they are not like the others.
 fn case(name: &'static str) -> Case {
     let spec = Spec {
         id: 1,

@@ -1,4 +1,5 @@
-//! One case: a machine, what is hidden in it, two recordings to fit on and one held out, and the key.
+//! One case: a machine, what is hidden in it, two recordings to fit on and one held out, and the
+//! key.
 
 use super::case_builder::{CaseBuilder, Plan};
 use super::effects;
@@ -41,7 +42,8 @@ pub(crate) struct Case {
     /// A loop ran, and its reference is recorded.
     pub(crate) with_reference: [bool; 3],
     pub(crate) with_force: bool,
-    /// The category that the case turned out to have: effects that do not show in the recordings cannot be asked for.
+    /// The category that the case turned out to have: effects that do not show in the recordings
+    /// cannot be asked for.
     pub(crate) category: Category,
     /// The level nearest to what was reached.
     pub(crate) level: f64,
@@ -51,7 +53,8 @@ pub(crate) struct Case {
 }
 
 impl Case {
-    /// The three recordings measured at another bandwidth, on the held-out one: what an oracle would remove and leave.
+    /// The three recordings measured at another bandwidth, on the held-out one: what an oracle
+    /// would remove and leave.
     pub(crate) fn held_out(&self, band: f64) -> Measured {
         let rows: Vec<&[Row]> = self.recordings.iter().map(Vec::as_slice).collect();
         measure(&rows, 2, &self.believed, &self.declared, self.machine.rate, band)
@@ -65,9 +68,9 @@ const LEVELS: [(f64, f64); 3] = [(10.0, 7.0), (3.0, 2.1), (1.0, 0.7)];
 /// From here on an effect of a pair or triple has to be found.
 const SHOWS: f64 = 2.1;
 
-/// Builds the case. Another machine is drawn only where nobody would keep the recordings: the motion diverged, the loop
-/// lost its reference, or hardly anything moved. What does not show in them stays as it is. `None`: no machine could be
-/// recorded.
+/// Builds the case. Another machine is drawn only where nobody would keep the recordings: the
+/// motion diverged, the loop lost its reference, or hardly anything moved. What does not show in
+/// them stays as it is. `None`: no machine could be recorded.
 pub(crate) fn build(spec: &Spec, seed: u64, quick: bool) -> Option<Case> {
     let label =
         format!("{}/{}/{}/{}", spec.category.word(), spec.hidden.join("+"), spec.strength, spec.repeat);
@@ -82,7 +85,8 @@ fn level(reached: f64) -> Option<f64> {
     LEVELS.iter().find(|(_, least)| reached >= *least).map(|(level, _)| *level)
 }
 
-/// Returns the category and strength of a case by what shows in it: a pair with one effect that does not show is a case of one.
+/// Returns the category and strength of a case by what shows in it: a pair with one effect that
+/// does not show is a case of one.
 fn settle(spec: &Spec, alone: &[f64]) -> (Category, f64) {
     let strongest = alone.iter().copied().fold(0.0, f64::max);
     match spec.category {
@@ -248,7 +252,8 @@ fn draw_plan(spec: &Spec, machine: &Machine, around: &Around, own: &mut Rng) -> 
     (plan, with_reference)
 }
 
-/// Finds the scale of every hidden effect at which it has the strength asked for. `None`: the motion diverges.
+/// Finds the scale of every hidden effect at which it has the strength asked for. `None`: the
+/// motion diverges.
 fn find_scales(builder: &CaseBuilder) -> Option<Vec<(usize, f64)>> {
     let spec = builder.spec;
     let mut scales: Vec<(usize, f64)> = Vec::new();
@@ -264,7 +269,8 @@ fn find_scales(builder: &CaseBuilder) -> Option<Vec<(usize, f64)>> {
     Some(scales)
 }
 
-/// Measures every effect again, alone, as it is beside the others: effect over noise. `None`: the motion diverges.
+/// Measures every effect again, alone, as it is beside the others: effect over noise. `None`: the
+/// motion diverges.
 fn measured_alone(builder: &CaseBuilder, scales: &[(usize, f64)]) -> Option<Vec<f64>> {
     let strength = |&(i, s): &(usize, f64)| {
         let now = builder.measured(i, s, scales, 40e-6).ok()?;
@@ -291,7 +297,8 @@ fn record(builder: &CaseBuilder, plant: &Plant, believed: &Believed) -> Option<V
     Some(recordings)
 }
 
-/// A drive that asks for its limit all the time, or a loop that has lost its reference: nobody would keep the recording.
+/// A drive that asks for its limit all the time, or a loop that has lost its reference: nobody
+/// would keep the recording.
 fn lost_control(rows: &[Row], m: &Machine) -> bool {
     let clipped = rows.iter().filter(|r| r.command.abs() > 0.999 * m.limit).count();
     let mut far = 0;
@@ -302,7 +309,8 @@ fn lost_control(rows: &[Row], m: &Machine) -> bool {
     clipped * 10 > rows.len() || far * 10 > rows.len()
 }
 
-/// Draws the excitations of a recording, independent of the hidden effects: three kinds, in the small run two.
+/// Draws the excitations of a recording, independent of the hidden effects: three kinds, in the
+/// small run two.
 fn draw_kinds(spec: &Spec, quick: bool, pick: &mut Rng) -> Vec<Kind> {
     if let Some(poor) = spec.poor {
         return vec![*pick.pick(poor)];

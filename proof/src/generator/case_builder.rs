@@ -1,4 +1,5 @@
-//! A case before its strengths are found: a machine with plans for its recordings, played again and again.
+//! A case before its strengths are found: a machine with plans for its recordings, played again and
+//! again.
 
 use super::drive::Segment;
 use super::effects;
@@ -104,7 +105,8 @@ impl CaseBuilder<'_> {
         simulate(plant, believed, &run, step)
     }
 
-    /// Measures what effect `i` alone does. Its companions that are terms of the nominal model are present and known.
+    /// Measures what effect `i` alone does. Its companions that are terms of the nominal model are
+    /// present and known.
     pub(super) fn measured(
         &self,
         i: usize,
@@ -138,7 +140,8 @@ impl CaseBuilder<'_> {
         Ok(commands[commands.len() * 98 / 100])
     }
 
-    /// Finds the scale of effect `i` alone at which effect over noise is `target`, or the bound of it that comes nearest.
+    /// Finds the scale of effect `i` alone at which effect over noise is `target`, or the bound of
+    /// it that comes nearest.
     pub(super) fn calibrate(
         &self,
         i: usize,

@@ -35,7 +35,8 @@ impl Clock {
         }
     }
 
-    /// Draws the stamps of `rate` rows a second over `duration` s, in s, each a whole number of microseconds.
+    /// Draws the stamps of `rate` rows a second over `duration` s, in s, each a whole number of
+    /// microseconds.
     pub(crate) fn stamps(self, rate: f64, duration: f64, rng: &mut Rng) -> Vec<f64> {
         let interval = 1.0 / rate;
         let count = (duration * rate) as usize;
@@ -59,8 +60,8 @@ impl Clock {
 }
 
 impl Stamping {
-    /// Draws a stamping that is never so far off that the place read at top speed is more than a count or so wrong;
-    /// `count_time` is the time of a count at that speed, in s.
+    /// Draws a stamping that is never so far off that the place read at top speed is more than a
+    /// count or so wrong; `count_time` is the time of a count at that speed, in s.
     pub(crate) fn draw(rng: &mut Rng, rate: f64, count_time: f64) -> Self {
         match rng.below(10) {
             0 | 1 => Self::Noisy((rng.log_range(0.005, 0.1) / rate).min(count_time)),

@@ -1,5 +1,6 @@
-//! The drive of the machine: open-loop commands, motion profiles, and the loop that follows them. The loop runs at the
-//! rows of the recording, on counts, so that the recorded command is exactly what the drive was sent.
+//! The drive of the machine: open-loop commands, motion profiles, and the loop that follows them.
+//! The loop runs at the rows of the recording, on counts, so that the recorded command is exactly
+//! what the drive was sent.
 
 use std::f64::consts::TAU;
 
@@ -158,8 +159,9 @@ pub(crate) struct Segment {
 }
 
 impl Segment {
-    /// Place (from the start of the recording), speed and acceleration to follow at `t` of the segment's own time. A loop that
-    /// begins `away` from the start goes back at about `speed` while it follows.
+    /// Place (from the start of the recording), speed and acceleration to follow at `t` of the
+    /// segment's own time. A loop that begins `away` from the start goes back at about `speed`
+    /// while it follows.
     pub(crate) fn reference(&self, t: f64, away: f64, speed: f64) -> (f64, f64, f64) {
         let (q, v, a) = self.drive.reference(t);
         let back = (3.0 * away.abs() / speed).clamp(0.05, 0.6 * self.length.max(0.1));
@@ -168,8 +170,9 @@ impl Segment {
     }
 }
 
-/// A digital loop on counts: proportional, derivative on a filtered difference, integral, and feed-forward of the nominal
-/// inertia, viscosity and dry friction where it is switched on. With a small `kp` it is a velocity loop with integral action.
+/// A digital loop on counts: proportional, derivative on a filtered difference, integral, and
+/// feed-forward of the nominal inertia, viscosity and dry friction where it is switched on. With a
+/// small `kp` it is a velocity loop with integral action.
 #[derive(Clone, Debug)]
 pub(crate) struct Loop {
     pub(crate) kp: f64,
@@ -188,7 +191,8 @@ pub(crate) struct Loop {
 }
 
 impl Loop {
-    /// A loop of the given bandwidth (rad/s) and damping for an inertia and a gain; `ki` relative to `kp · bandwidth`.
+    /// A loop of the given bandwidth (rad/s) and damping for an inertia and a gain; `ki` relative
+    /// to `kp · bandwidth`.
     pub(crate) fn tuned(inertia: f64, gain: f64, bandwidth: f64, damping: f64, integral: f64) -> Self {
         let kp = inertia * bandwidth * bandwidth / gain;
         Self {

@@ -1,5 +1,5 @@
-//! The contract's effects, each as physics with variation: the machine that it needs, and how a strength `s` scales it. `s`
-//! grows with the effect; its unit is the effect's own.
+//! The contract's effects, each as physics with variation: the machine that it needs, and how a
+//! strength `s` scales it. `s` grows with the effect; its unit is the effect's own.
 
 use std::f64::consts::TAU;
 
@@ -60,8 +60,8 @@ pub(crate) fn needs(name: &str) -> Needs {
     needs
 }
 
-/// True if two effects may be hidden together: not if one can replace the other, nor if motor data cannot distinguish
-/// them.
+/// True if two effects may be hidden together: not if one can replace the other, nor if motor data
+/// cannot distinguish them.
 pub(crate) fn go_together(a: &str, b: &str) -> bool {
     const APART: [&[&str]; 8] = [
         &["backlash", "drive_compliance", "roller_slip", "presliding_friction"],
@@ -114,8 +114,9 @@ pub(crate) fn bounds(name: &str, m: &Machine) -> (f64, f64, f64) {
     }
 }
 
-/// Puts the effect into `plant` at scale `s`. `rng` must be the same for every scale of one case: it draws the form.
-/// `base` is a mechanical place from which the recordings work forward over the machine's travel.
+/// Puts the effect into `plant` at scale `s`. `rng` must be the same for every scale of one case:
+/// it draws the form. `base` is a mechanical place from which the recordings work forward over the
+/// machine's travel.
 pub(crate) fn apply(name: &str, m: &Machine, plant: &mut Plant, base: f64, s: f64, rng: &mut Rng) {
     let coulomb = m.plant.dry.coulomb;
     let (v, travel, duration) = (m.top_speed, m.travel, m.duration);

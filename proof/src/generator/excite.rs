@@ -1,4 +1,5 @@
-//! Excitations: what is played on a machine. Each kind is what an engineer would play to show some effects and not others.
+//! Excitations: what is played on a machine. Each kind is what an engineer would play to show some
+//! effects and not others.
 
 use super::drive::{Drive, Loop, Profile, Segment, Tones};
 use super::machine::Machine;
@@ -17,7 +18,8 @@ pub(crate) enum Kind {
     Trapezoids,
     /// Point-to-point moves that ask the drive for much.
     Hard,
-    /// Open loop: slow waves and a multisine up to the residual bandwidth (linear machines: under a loop).
+    /// Open loop: slow waves and a multisine up to the residual bandwidth (linear machines: under a
+    /// loop).
     Multisine,
     /// Moves under a loop with a multisine injected into the command.
     Injected,

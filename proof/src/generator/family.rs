@@ -1,4 +1,5 @@
-//! Families of machines, from the drive of a hand-held needle to a heavy ball-screw axis: the ranges of their sizes.
+//! Families of machines, from the drive of a hand-held needle to a heavy ball-screw axis: the
+//! ranges of their sizes.
 
 use std::f64::consts::TAU;
 
@@ -9,7 +10,8 @@ use crate::rng::Rng;
 pub(crate) struct Needs {
     /// `Some(true)`: rotary only.
     pub(crate) rotary: Option<bool>,
-    /// The recordings must start at about the same place: the effect sits somewhere along the travel.
+    /// The recordings must start at about the same place: the effect sits somewhere along the
+    /// travel.
     pub(crate) place: bool,
     /// No weight, no tilt (they would hide the effect), or both wanted.
     pub(crate) tilt: Option<bool>,
@@ -152,7 +154,8 @@ const SLOW_AXIS: Family = Family {
     ..SERVO_DRIVE
 };
 
-/// The families by the number that is drawn: the rotary ones without a gear (the fast ones first), linear ones, geared ones.
+/// The families by the number that is drawn: the rotary ones without a gear (the fast ones first),
+/// linear ones, geared ones.
 static FAMILIES: [Family; 9] = [
     // With the converter of the board.
     Family { command_steps: 2048.0, ..NEEDLE_DRIVE },

@@ -50,7 +50,8 @@ fn drift_law(rng: &mut Rng) -> DriftLaw {
     if rng.chance(0.7) { DriftLaw::Exponential } else { DriftLaw::Hyperbolic }
 }
 
-/// Draws a drift of dry friction by the share `s` over a recording of `duration` s, mostly downwards.
+/// Draws a drift of dry friction by the share `s` over a recording of `duration` s, mostly
+/// downwards.
 pub(super) fn friction_drift(s: f64, duration: f64, rng: &mut Rng) -> Drift {
     let law = drift_law(rng);
     let up = rng.chance(0.25);
@@ -122,8 +123,8 @@ pub(super) fn place_shape(base: f64, travel: f64, rng: &mut Rng) -> Shape {
     }
 }
 
-/// Harmonics of a slotted machine (or of a magnet track, where linear): multiples of a slot or pole number, falling, rms
-/// as asked.
+/// Harmonics of a slotted machine (or of a magnet track, where linear): multiples of a slot or pole
+/// number, falling, rms as asked.
 pub(super) fn harmonics(m: &Machine, rms: f64, rng: &mut Rng) -> Vec<Harmonic> {
     // At the fastest rate of turning a wave must still be several rows long.
     let turns = m.top_speed / m.plant.turn;

@@ -1,5 +1,5 @@
-//! Machines drawn at random: what they weigh, how they rub, how they are read and recorded. Sizes from a hand-held needle
-//! device to a heavy ball-screw axis.
+//! Machines drawn at random: what they weigh, how they rub, how they are read and recorded. Sizes
+//! from a hand-held needle device to a heavy ball-screw axis.
 
 use std::f64::consts::TAU;
 
@@ -35,10 +35,12 @@ pub(crate) struct Machine {
     pub(crate) tilt: bool,
     pub(crate) clock: Clock,
     pub(crate) stamping: Stamping,
-    /// Standard deviation of a reading beyond its rounding, counts, and whether the rig file tells it.
+    /// Standard deviation of a reading beyond its rounding, counts, and whether the rig file tells
+    /// it.
     pub(crate) noise_counts: f64,
     pub(crate) noise_told: bool,
-    /// |command| that the recordings exceed in 2 % of their rows; the drive's limit until it is measured.
+    /// |command| that the recordings exceed in 2 % of their rows; the drive's limit until it is
+    /// measured.
     pub(crate) peak_command: f64,
     /// Loop bandwidth, rad/s.
     pub(crate) bandwidth: f64,
@@ -47,7 +49,8 @@ pub(crate) struct Machine {
 }
 
 impl Machine {
-    /// Residual bandwidth in which strengths are defined, Hz: 100, or a twentieth of the rate where that is less.
+    /// Residual bandwidth in which strengths are defined, Hz: 100, or a twentieth of the rate where
+    /// that is less.
     pub(crate) fn residual_bandwidth(&self) -> f64 {
         residual_bandwidth(self.rate)
     }
@@ -115,8 +118,8 @@ impl Machine {
     }
 }
 
-/// Draws the encoder's resolution, in counts per unit of travel: fine enough that whole counts make 0.3–4 % of the dry
-/// friction at the residual bandwidth.
+/// Draws the encoder's resolution, in counts per unit of travel: fine enough that whole counts make
+/// 0.3–4 % of the dry friction at the residual bandwidth.
 fn draw_resolution(rng: &mut Rng, rotary: bool, rate: f64, sizes: &Sizes) -> f64 {
     let bandwidth_hz = residual_bandwidth(rate);
     // White quantisation δ²/12 through d²/dt² up to B.
@@ -146,7 +149,8 @@ fn draw_travel(rng: &mut Rng, rotary: bool, place: bool, sizes: &Sizes, duration
     }
 }
 
-/// Draws the spread of the starts that the rig file states, in u. `place`: an effect sits somewhere along the travel.
+/// Draws the spread of the starts that the rig file states, in u. `place`: an effect sits somewhere
+/// along the travel.
 fn draw_start_spread(rng: &mut Rng, place: bool, travel: f64, turn: f64) -> Option<f64> {
     if place {
         Some(travel * rng.range(0.005, 0.02))
@@ -157,14 +161,15 @@ fn draw_start_spread(rng: &mut Rng, place: bool, travel: f64, turn: f64) -> Opti
     }
 }
 
-/// Returns the loop's bandwidth, in rad/s, at which the speed filter's ripple from one count stays below a third of the dry
-/// friction.
+/// Returns the loop's bandwidth, in rad/s, at which the speed filter's ripple from one count stays
+/// below a third of the dry friction.
 fn loop_bandwidth(rate: f64, friction_acceleration: f64, counts_per_unit: f64) -> f64 {
     let by_count = (0.3 * friction_acceleration * counts_per_unit / 10.0).sqrt();
     (TAU * rate / 25.0).min(by_count).min(TAU * 12.0)
 }
 
-/// Residual bandwidth in which strengths are defined, Hz: 100, or a twentieth of the rate where that is less.
+/// Residual bandwidth in which strengths are defined, Hz: 100, or a twentieth of the rate where
+/// that is less.
 fn residual_bandwidth(rate: f64) -> f64 {
     (rate / 20.0).min(100.0)
 }

@@ -1,4 +1,5 @@
-//! Physics outside the contract's names: the right answer is to say that something is there and that no name fits.
+//! Physics outside the contract's names: the right answer is to say that something is there and
+//! that no name fits.
 
 use super::family::Needs;
 use super::machine::Machine;

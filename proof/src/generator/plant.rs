@@ -1,7 +1,8 @@
-//! The true machine: every piece of physics that a case may hide, as plain numbers. Written from the physics;
-//! independent of the diagnosis and of the rig file.
+//! The true machine: every piece of physics that a case may hide, as plain numbers. Written from
+//! the physics; independent of the diagnosis and of the rig file.
 //!
-//! Units: rad or m for travel (called `u` for unit below), N·m or N for force, kg·m² or kg for inertia.
+//! Units: rad or m for travel (called `u` for unit below), N·m or N for force, kg·m² or kg for
+//! inertia.
 
 /// A sinusoid along the travel: `amplitude · sin(order · 2π/turn · q + phase)`.
 #[derive(Clone, Debug)]
@@ -85,7 +86,8 @@ pub(crate) struct Stribeck {
 pub(crate) enum Presliding {
     /// LuGre (Canudas de Wit 1995): bristle stiffness and damping.
     LuGre { stiffness: f64, damping: f64 },
-    /// Maxwell-slip (Iwan; Lampaert 2003): parallel elements, each a share of the sliding force and its stiffness.
+    /// Maxwell-slip (Iwan; Lampaert 2003): parallel elements, each a share of the sliding force and
+    /// its stiffness.
     MaxwellSlip { elements: Vec<(f64, f64)> },
 }
 
@@ -162,7 +164,8 @@ pub(crate) enum Train {
 pub(crate) enum Foreign {
     /// A spring in series with a dashpot to ground (Maxwell body).
     CreepSpring { stiffness: f64, relaxation: f64 },
-    /// A force periodic in a phase that advances with speed but not with the turn: rate = a + b·|v|^p.
+    /// A force periodic in a phase that advances with speed but not with the turn: rate = a +
+    /// b·|v|^p.
     WhirlingForce { amplitude: f64, base_hz: f64, per_speed_hz: f64, power: f64 },
     /// A force periodic in time, phase by chance in each recording.
     Hum { amplitude: f64, hertz: f64 },
@@ -176,7 +179,8 @@ pub(crate) enum Foreign {
     Latch { force: f64, places: Vec<(f64, f64)>, side: f64 },
     /// A force of the product of travel and speed, rising and falling again.
     Shuttle { amplitude: f64, centre: f64, scale: f64 },
-    /// Configuration-dependent inertia (a linkage): J(q) = J·(1 + share·shape), with its ½J′v² force.
+    /// Configuration-dependent inertia (a linkage): J(q) = J·(1 + share·shape), with its ½J′v²
+    /// force.
     Linkage { share: f64, centre: f64, width: f64 },
 }
 

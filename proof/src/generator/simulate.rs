@@ -1,5 +1,6 @@
-//! A run of a plant and its recording: the encoder is read, the command sent and a row written at every stamp, and the plant
-//! moves on between them. Commands change only at row stamps: the zero-order hold of the contract.
+//! A run of a plant and its recording: the encoder is read, the command sent and a row written at
+//! every stamp, and the plant moves on between them. Commands change only at row stamps: the
+//! zero-order hold of the contract.
 
 use super::drive::{Loop, Segment};
 use super::plant::{Plant, sign};
@@ -10,7 +11,8 @@ use crate::rng::Rng;
 /// The longest step of a recording, in s: 100 kHz.
 pub(crate) const STEP: f64 = 10e-6;
 
-/// The true values of the terms that the rig's author knows; zero for a term that is not in the nominal model.
+/// The true values of the terms that the rig's author knows; zero for a term that is not in the
+/// nominal model.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Believed {
     pub(crate) inertia: f64,
@@ -67,7 +69,8 @@ pub(crate) struct Row {
     /// True travel, speed.
     pub(crate) q: f64,
     pub(crate) v: f64,
-    /// Reading − travel, quantisation included, without the zero; of it, the part that the hidden physics makes.
+    /// Reading − travel, quantisation included, without the zero; of it, the part that the hidden
+    /// physics makes.
     pub(crate) reading_error: f64,
     pub(crate) sensor_effect: f64,
     /// Mean over the interval that follows: force missing from the believed terms, and disturbance.
@@ -81,7 +84,8 @@ pub(crate) struct Row {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Diverged;
 
-/// Plays the run. Steps are at most `max_step` ([`STEP`] for recordings; coarser only while a strength is being sought).
+/// Plays the run. Steps are at most `max_step` ([`STEP`] for recordings; coarser only while a
+/// strength is being sought).
 pub(crate) fn simulate(
     plant: &Plant,
     believed: &Believed,
@@ -136,7 +140,8 @@ impl<'a> Recorder<'a> {
         }
     }
 
-    /// Reads the encoder, sends the command and writes the row. `interval` is the time to the next row, in s.
+    /// Reads the encoder, sends the command and writes the row. `interval` is the time to the next
+    /// row, in s.
     fn record(&mut self, time: f64, interval: Option<f64>) {
         let (run, s) = (self.run, &self.state);
         let Reading { counts, place, error } =
@@ -160,7 +165,8 @@ impl<'a> Recorder<'a> {
         });
     }
 
-    /// Moves the plant on from the row at `time` to the next one, and writes into the row what acted meanwhile.
+    /// Moves the plant on from the row at `time` to the next one, and writes into the row what
+    /// acted meanwhile.
     fn advance(&mut self, time: f64, interval: f64, max_step: f64) -> Result<(), Diverged> {
         let (believed, run) = (self.believed, self.run);
         let row = self.rows.len() - 1;
@@ -252,7 +258,8 @@ impl Encoder {
             && v.abs() > lost.above_speed
             && random.chance(1.0 - (-lost.rate * interval).exp())
         {
-            // A burst never exceeds what passed since the row before would allow by much; against the motion.
+            // A burst never exceeds what passed since the row before would allow by much; against
+            // the motion.
             let side = if lost.both_ways { random.sign() } else { 1.0 };
             self.lost += side * sign(v) * (lost.burst * random.range(0.6, 1.4)).round();
         }
@@ -280,7 +287,8 @@ impl Player {
         Self { segment: 0, control, away: 0.0 }
     }
 
-    /// Returns the command at a row, limited and rounded as the drive does it, and the reference in counts.
+    /// Returns the command at a row, limited and rounded as the drive does it, and the reference in
+    /// counts.
     fn command(
         &mut self,
         plant: &Plant,

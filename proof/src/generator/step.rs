@@ -1,6 +1,6 @@
-//! The integrator: position Verlet (second order, symplectic) with impulse-level dry friction (Moreau's time stepping), at
-//! steps of 10 µs or less. A step that would reverse the motion under friction ends at rest, so stick and slip are events
-//! and no speed threshold decides them.
+//! The integrator: position Verlet (second order, symplectic) with impulse-level dry friction
+//! (Moreau's time stepping), at steps of 10 µs or less. A step that would reverse the motion under
+//! friction ends at rest, so stick and slip are events and no speed threshold decides them.
 
 use super::foreign::{ForeignState, Moment};
 use super::plant::{Plant, Presliding, Train, harmonic_sum, sign};
@@ -18,7 +18,8 @@ pub(super) struct State {
 }
 
 impl State {
-    /// A plant at rest at `start`. `phase` is that of the oscillations that a foreign force begins with, in rad.
+    /// A plant at rest at `start`. `phase` is that of the oscillations that a foreign force begins
+    /// with, in rad.
     pub(super) fn new(plant: &Plant, start: f64, phase: f64) -> Self {
         let elements = match &plant.dry.presliding {
             Some(Presliding::MaxwellSlip { elements }) => elements.len(),
@@ -65,7 +66,8 @@ pub(super) struct Step {
     pub(super) at_rest: bool,
 }
 
-/// The forces of a step on the motor and on the load, without friction, and the inertia that they move.
+/// The forces of a step on the motor and on the load, without friction, and the inertia that they
+/// move.
 struct Forces {
     /// The drive's own, which dry friction may depend on; it is part of `motor`.
     drive: f64,
@@ -145,7 +147,8 @@ impl State {
         at_rest
     }
 
-    /// Moves motor and load that a train couples; the shares are those of the load. True if the motor ends at rest.
+    /// Moves motor and load that a train couples; the shares are those of the load. True if the
+    /// motor ends at rest.
     fn move_coupled(
         &mut self,
         plant: &Plant,
@@ -178,7 +181,8 @@ impl State {
     }
 }
 
-/// Dry friction as an impulse: it brings the momentum towards zero by at most `h · level` and never past it.
+/// Dry friction as an impulse: it brings the momentum towards zero by at most `h · level` and never
+/// past it.
 fn under_friction(
     momentum: f64,
     inertia: f64,

@@ -1,15 +1,17 @@
 //! The definition of an effect's strength.
 //!
-//! Let B be 100 Hz, or a twentieth of the sampling rate where that is less. In the two fit recordings, on rows that move
-//! (no instant at rest, and faster than 1 % of the recording's rms speed):
+//! Let B be 100 Hz, or a twentieth of the sampling rate where that is less. In the two fit
+//! recordings, on rows that move (no instant at rest, and faster than 1 % of the recording's rms
+//! speed):
 //!
-//! - **noise** is the rms of what an observer of bandwidth B would see with the true model in hand: the disturbance and
-//!   bias wander below B, plus inertia times the second derivative of the encoder's rounding below B; each recording's
-//!   mean is left out.
-//! - **effect** is the rms of the force that the nominal structure lacks, with its true values in it: inertia times true
-//!   acceleration less the believed forces, below B (what a sensor effect does to the reading counts through inertia and
-//!   viscosity), after taking out what a refit of the nominal terms within their declared uncertainty, and an offset of
-//!   each recording, could imitate. The gain stays: scaling everything together is not a refit.
+//! - **noise** is the rms of what an observer of bandwidth B would see with the true model in hand:
+//!   the disturbance and bias wander below B, plus inertia times the second derivative of the
+//!   encoder's rounding below B; each recording's mean is left out.
+//! - **effect** is the rms of the force that the nominal structure lacks, with its true values in
+//!   it: inertia times true acceleration less the believed forces, below B (what a sensor effect
+//!   does to the reading counts through inertia and viscosity), after taking out what a refit of
+//!   the nominal terms within their declared uncertainty, and an offset of each recording, could
+//!   imitate. The gain stays: scaling everything together is not a refit.
 //!
 //! Strength is effect / noise.
 
@@ -85,7 +87,8 @@ fn columns(rows: &[Row], believed: &Believed, rate: f64, band: f64) -> Columns {
         effect,
         noise,
         acceleration: below(derivative(&below(of(&|r| r.v)), rate)),
-        // Through the same filter as the effect: a step of friction at a reversal is smeared alike on both sides.
+        // Through the same filter as the effect: a step of friction at a reversal is smeared alike
+        // on both sides.
         direction: below(of(&|r| if r.moving { sign(r.v) } else { 0.0 })),
         tilt: below(of(&|r| r.tilt.sin())),
         seconds: rows.len() as f64 / rate,
@@ -94,8 +97,9 @@ fn columns(rows: &[Row], believed: &Believed, rate: f64, band: f64) -> Columns {
     }
 }
 
-/// Measures `recordings` at bandwidth `band`; what a refit can imitate is fitted on the first `fitted` of them (offsets on
-/// each) and the numbers are of the rest, or of all where `fitted` is all.
+/// Measures `recordings` at bandwidth `band`; what a refit can imitate is fitted on the first
+/// `fitted` of them (offsets on each) and the numbers are of the rest, or of all where `fitted` is
+/// all.
 pub(crate) fn measure(
     recordings: &[&[Row]],
     fitted: usize,
@@ -145,10 +149,12 @@ fn moving_share(sets: &[Columns]) -> f64 {
     moving as f64 / f64::max(all as f64, 1.0)
 }
 
-/// Nominal terms that are refitted: inertia, viscosity, dry friction, weight. An offset of each recording follows them.
+/// Nominal terms that are refitted: inertia, viscosity, dry friction, weight. An offset of each
+/// recording follows them.
 const NOMINAL: usize = 4;
 
-/// A refit of the nominal terms within their declared uncertainty, and of an offset of each recording.
+/// A refit of the nominal terms within their declared uncertainty, and of an offset of each
+/// recording.
 struct Refit<'a> {
     believed: &'a Believed,
     declared: &'a Declared,
@@ -168,7 +174,8 @@ impl Refit<'_> {
         x
     }
 
-    /// Returns the values of the terms that imitate the effect best. `noise`: rms of the noise, as a force; `band` in Hz.
+    /// Returns the values of the terms that imitate the effect best. `noise`: rms of the noise, as
+    /// a force; `band` in Hz.
     fn solve(&self, sets: &[Columns], noise: f64, band: f64) -> Vec<f64> {
         let mut normal = Normal::new(self.width);
         let mut independent = 0.0;
@@ -215,7 +222,8 @@ mod tests {
         offset_allowed: true,
     };
 
-    /// A machine that swings at 0.7 Hz with noise of 0.05, and what is missing given by time and speed.
+    /// A machine that swings at 0.7 Hz with noise of 0.05, and what is missing given by time and
+    /// speed.
     fn rows(missing: impl Fn(f64, f64) -> f64) -> Vec<Row> {
         let mut rng = Rng::new(6);
         (0..20_000)
@@ -238,7 +246,8 @@ mod tests {
         let rows = rows(|t, _| 0.3 * (40.0 * t).sin());
         let m = measure(&[&rows, &rows], 2, &BELIEVED, &DECLARED, 1000.0, 50.0);
         assert!((m.effect / (0.3 / 2_f64.sqrt()) - 1.0).abs() < 0.03, "{}", m.effect);
-        // White noise of 0.2 at 1 kHz, Butterworth run twice at 50 Hz: about 0.2·sqrt(2·0.835·50/1000).
+        // White noise of 0.2 at 1 kHz, Butterworth run twice at 50 Hz: about
+        // 0.2·sqrt(2·0.835·50/1000).
         assert!((m.noise / 0.058 - 1.0).abs() < 0.12, "{}", m.noise);
     }
 
@@ -246,7 +255,8 @@ mod tests {
     fn what_a_refit_can_imitate_does_not_count() {
         let dry = rows(|_, v| 0.3 * v.signum());
         assert!(ratio(&dry, &DECLARED) < 0.1, "{}", ratio(&dry, &DECLARED));
-        // The prior holds a value near what the rig declares: this much friction is no refit any more.
+        // The prior holds a value near what the rig declares: this much friction is no refit any
+        // more.
         let sure = Declared { coulomb: 1e-4, ..DECLARED };
         assert!(ratio(&dry, &sure) > 2.0, "{}", ratio(&dry, &sure));
         let offset = rows(|_, _| 0.3);

@@ -42,7 +42,8 @@ pub(crate) fn pushes(m: &Machine, size: f64, rng: &mut Rng) -> Series {
     Series { interval, values }
 }
 
-/// Noise and wander of the force with unit rms: band-limited noise, and a slow part at 30–60 % of it.
+/// Noise and wander of the force with unit rms: band-limited noise, and a slow part at 30–60 % of
+/// it.
 pub(crate) fn disturbance(m: &Machine, rng: &mut Rng) -> Series {
     let interval: f64 = 5e-4;
     let count = (m.duration / interval) as usize + 2;

@@ -118,7 +118,8 @@ fn two_masses_ring_at_the_known_frequency() {
     let period = (crossings[crossings.len() - 1] - crossings[1]) / (crossings.len() - 2) as f64;
     let expected = (500.0_f64 * 1.5).sqrt();
     assert!((TAU / period / expected - 1.0).abs() < 1e-3, "{} against {expected}", TAU / period);
-    // The motor stands still at the antiresonance sqrt(k/J_load): force there, and the motor hardly moves.
+    // The motor stands still at the antiresonance sqrt(k/J_load): force there, and the motor hardly
+    // moves.
     let anti = (500.0_f64 / 2.0).sqrt() / TAU;
     plant.viscous = 1.0;
     let motion = |hz: f64| {
@@ -139,7 +140,8 @@ fn backlash_lets_the_motor_run_free_by_the_gap() {
     plant.viscous = 2.0;
     plant.train =
         Train::Gap { load_share: 0.5, friction_share: 0.5, gap: 0.1, stiffness: 2e5, damping: 200.0 };
-    // The motor creeps over half the gap at 0.02; what is left of the force then, 0.02, the load's friction holds.
+    // The motor creeps over half the gap at 0.02; the load's friction holds the rest of the force,
+    // 0.02.
     let rows = play(&plant, &open(1000.0, 30.0, levels(&[(0.05, 60.0)])));
     let rest = rows.last().unwrap();
     assert!((rest.q - 0.05).abs() < 3e-3, "stands at {}", rest.q);

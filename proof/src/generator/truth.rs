@@ -6,8 +6,8 @@ use super::plant::{Drift, DriftLaw, Harmonic, Plant, Presliding, Shape, Stribeck
 use super::simulate::Row;
 use crate::key::Parameter;
 
-/// The contract's parameters of the effect as they truly are, where the form drawn has them. `rows` are the fit recordings.
-/// `cold`: they begin before anything has warmed.
+/// The contract's parameters of the effect as they truly are, where the form drawn has them. `rows`
+/// are the fit recordings. `cold`: they begin before anything has warmed.
 pub(crate) fn truth(name: &str, plant: &Plant, rows: &[&[Row]], cold: bool) -> Vec<Parameter> {
     let mut truths = Truths { effect: name, list: Vec::new() };
     match name {
@@ -43,7 +43,8 @@ pub(crate) fn truth(name: &str, plant: &Plant, rows: &[&[Row]], cold: bool) -> V
                 truths.put_force("stiffness", stiffness);
             }
         }
-        // `lost`, counts all together, does not say over which recordings: left out of the coverage.
+        // `lost`, counts all together, does not say over which recordings: left out of the
+        // coverage.
         _ => {}
     }
     truths.list
@@ -88,7 +89,8 @@ impl Truths<'_> {
         }
     }
 
-    /// The difference between the largest and the smallest value of (height, shape) over the places of the recordings.
+    /// The difference between the largest and the smallest value of (height, shape) over the places
+    /// of the recordings.
     fn put_span(&mut self, profile: Option<(f64, Shape)>, rows: &[&[Row]]) {
         let Some((height, shape)) = profile else { return };
         let places = rows.iter().flat_map(|r| r.iter()).map(|r| r.q);

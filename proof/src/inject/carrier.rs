@@ -12,7 +12,7 @@ use crate::tool::Paths;
 pub(crate) struct Place {
     /// Name of the case's folder.
     pub(crate) id: String,
-    /// The machine: what stands before the first hyphen of the name.
+    /// The machine: the name up to its first hyphen.
     pub(crate) machine: String,
     pub(crate) paths: Paths,
 }
@@ -25,7 +25,8 @@ pub(crate) struct Carrier {
     pub(crate) holdouts: Vec<Recording>,
 }
 
-/// Finds the cases of the folders, in the order of their names. A folder that is a case itself counts.
+/// Finds the cases of the folders, in the order of their names. A folder that is a case itself
+/// counts.
 ///
 /// # Errors
 /// One sentence: what cannot be read, and where.

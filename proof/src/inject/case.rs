@@ -9,9 +9,11 @@ use crate::dynamics::recording::Recording;
 use crate::rng::Rng;
 use crate::signal::rms;
 
-/// A law of which the nominal model takes more than this part of the force is no effect of its own there.
+/// A law of which the nominal model takes more than this part of the force is no effect of its own
+/// there.
 const IMITATED: f64 = 0.97;
-/// The largest concealed force over that of the drive, or over that of the inertia where nothing drives.
+/// The largest concealed force over that of the drive, or over that of the inertia where nothing
+/// drives.
 const STRONGEST: f64 = 1.0;
 /// The size is found to this part.
 const EXACT: f64 = 0.1;
@@ -42,7 +44,8 @@ impl Ground {
         Self { carrier, states, sights }
     }
 
-    /// Draws an effect that leaves `left` N·m or N on the recordings to fit on after the nominal model has been fitted.
+    /// Draws an effect that leaves `left` N·m or N on the recordings to fit on after the nominal
+    /// model has been fitted.
     pub(crate) fn draw(&self, name: &str, left: f64, rng: &mut Rng) -> Option<Drawn> {
         let law = shapes::draw(name, &self.carrier, &self.states, rng)?;
         let strongest = self
@@ -63,8 +66,8 @@ impl Ground {
         self.settle(effect)
     }
 
-    /// Rms that the effect leaves in the band after the nominal model has been fitted to it; nothing where that imitates it
-    /// or it cannot be so strong.
+    /// Rms that the effect leaves in the band after the nominal model has been fitted to it;
+    /// nothing where that imitates it or it cannot be so strong.
     fn leaves(&self, effect: &Concealed) -> Option<f64> {
         let mut blocks = Vec::new();
         for (i, (sight, r)) in self.sights.iter().zip(&self.carrier.fits).enumerate() {
@@ -196,7 +199,8 @@ mod tests {
     #[test]
     fn nothing_is_drawn_that_the_recordings_cannot_hold() {
         let ground = Ground::new(carrier(|_, _| 0.0), 15.0);
-        // The rig knows both frictions; there is no load, no tilt, and no place that recordings share.
+        // The rig knows both frictions; there is no load, no tilt, and no place that recordings
+        // share.
         for name in ["viscous_friction", "coulomb_friction", "load_dependent_friction", "tilt_gravity"] {
             assert!(ground.draw(name, 0.1, &mut Rng::new(1)).is_none(), "{name}");
         }

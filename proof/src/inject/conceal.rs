@@ -1,6 +1,7 @@
-//! Conceals an effect in a recording. Where J·q̈ = k·u + F holds, J·q̈ = k·u′ + F + f holds for u′ = u − f/k: the recorded
-//! motion with the command u′ is a recording of the same machine with one effect more. A command is held over a row, so f
-//! is its mean over the row. A map of the command is inverted; an error of reading goes into the counts.
+//! Conceals an effect in a recording. Where J·q̈ = k·u + F holds, J·q̈ = k·u′ + F + f holds for
+//! u′ = u − f/k: the recorded motion with the command u′ is a recording of the same machine with
+//! one effect more. A command is held over a row, so f is its mean over the row. A map of the
+//! command is inverted; an error of reading goes into the counts.
 
 use std::f64::consts::TAU;
 
@@ -42,7 +43,8 @@ impl Changed {
     }
 }
 
-/// The recording with the effect in it; `index` tells recordings apart: each has an encoder's zero of its own.
+/// The recording with the effect in it; `index` tells recordings apart: each has an encoder's zero
+/// of its own.
 pub(crate) fn conceal(
     effect: &Concealed,
     r: &Recording,
@@ -141,8 +143,8 @@ fn forces(effect: &Concealed, r: &Recording, state: &State, rig: &RigFile, zero:
     }
 }
 
-/// Force of Maxwell-slip bristles over their sliding force, mean of each row: eight in parallel, break lengths spread over a
-/// decade about the one given.
+/// Force of Maxwell-slip bristles over their sliding force, mean of each row: eight in parallel,
+/// break lengths spread over a decade about the one given.
 fn bristles(state: &State, length: f64) -> Vec<f64> {
     const COUNT: usize = 8;
     let lengths: Vec<f64> =

@@ -1,6 +1,7 @@
-//! The exactness of concealing, judged by the generator's integrator: a machine without the effect makes a recording; the
-//! effect is concealed in it; then a machine that *has* the effect in its equations is driven with the concealed command and
-//! has to move as recorded. The laws that move it are the generator's own.
+//! The exactness of concealing, judged by the generator's integrator: a machine without the effect
+//! makes a recording; the effect is concealed in it; then a machine that *has* the effect in its
+//! equations is driven with the concealed command and has to move as recorded. The laws that move
+//! it are the generator's own.
 
 use super::conceal::{Changed, Concealed, conceal};
 use super::rig_file::RigFile;
@@ -100,7 +101,8 @@ struct Checked {
 fn check(law: Law, size: f64, fast: f64, other: &dyn Fn(&mut Plant)) -> Checked {
     let commands: Vec<f64> = (0..ROWS)
         .map(|i| {
-            // At rest until a kick that no friction withstands: what a delay takes is nothing, and no rest is left slowly.
+            // At rest until a kick that no friction withstands: what a delay takes is nothing, and
+            // no rest is left slowly.
             let t = (i as f64 - 20.0) * ROW_S;
             if t < 0.0 {
                 0.0

@@ -1,4 +1,5 @@
-//! The judgement of a concealed effect: whether it was found, which names are false, and where it was lost.
+//! The judgement of a concealed effect: whether it was found, which names are false, and where it
+//! was lost.
 
 use serde_json::Value;
 
@@ -112,7 +113,8 @@ impl Case {
         self.own.iter().any(|own| own.holds(&named.name) || named.holds(&own.name))
     }
 
-    /// The tool's names that are not the machine's own: confidence, and whether the name or its class is right.
+    /// The tool's names that are not the machine's own: confidence, and whether the name or its
+    /// class is right.
     pub(crate) fn new_names(&self) -> Vec<(&Named, bool)> {
         let all = self.answer.as_ref().map_or(&[][..], |a| &a.effects);
         let right = |n: &&Named| n.holds(self.hidden);

@@ -1,7 +1,8 @@
-//! The plain rival: forward selection by least squares on shares of the force error, as an engineer writes it in an evening.
-//! A law counts by the smaller of its reductions on stretches left out of the fit and on the held-out recordings, and only if
-//! its size is the same on both within a factor of two. Laws of the command act on the command that the model so far
-//! predicts, never on the recorded one, which holds the noise that is to be explained.
+//! The plain rival: forward selection by least squares on shares of the force error, as an engineer
+//! writes it in an evening. A law counts by the smaller of its reductions on stretches left out of
+//! the fit and on the held-out recordings, and only if its size is the same on both within a factor
+//! of two. Laws of the command act on the command that the model so far predicts, never on the
+//! recorded one, which holds the noise that is to be explained.
 
 use std::rc::Rc;
 
@@ -27,7 +28,8 @@ pub(crate) struct Found {
 struct Tried {
     name: &'static str,
     columns: Vec<Vec<Vec<f64>>>,
-    /// Every recording has a phase of its own: two columns that only a recording's own coefficients may combine.
+    /// Every recording has a phase of its own: two columns that only a recording's own coefficients
+    /// may combine.
     periodic: bool,
 }
 
@@ -83,7 +85,8 @@ fn columns(candidate: &Candidate, sights: &[Sight], predicted: &[Vec<f64>]) -> T
     }
 }
 
-/// Nominal columns and those of the laws; a periodic law has two columns for every recording to fit on.
+/// Nominal columns and those of the laws; a periodic law has two columns for every recording to fit
+/// on.
 fn blocks(sights: &[Sight], fits: usize, laws: &[Rc<Tried>]) -> Vec<Block> {
     let one = |(r, sight): (usize, &Sight)| {
         let mut columns = sight.nominal.clone();
@@ -102,7 +105,8 @@ fn blocks(sights: &[Sight], fits: usize, laws: &[Rc<Tried>]) -> Vec<Block> {
     sights.iter().enumerate().map(one).collect()
 }
 
-/// Rms left on the held-out recordings: the phase of a periodic law is found there, its amplitude is not.
+/// Rms left on the held-out recordings: the phase of a periodic law is found there, its amplitude
+/// is not.
 fn held_out(holdouts: &[Block], coefficients: &[f64], laws: &[Rc<Tried>], sights: &[Sight]) -> f64 {
     let mut blocks: Vec<Block> = holdouts.to_vec();
     let mut at = sights[0].nominal.len();
@@ -129,7 +133,8 @@ fn held_out(holdouts: &[Block], coefficients: &[f64], laws: &[Rc<Tried>], sights
     left_on(&blocks, coefficients)
 }
 
-/// The smaller of the two shares of the force error that a law takes; nothing where its sizes do not agree.
+/// The smaller of the two shares of the force error that a law takes; nothing where its sizes do
+/// not agree.
 fn share(
     sights: &[Sight],
     fits: usize,
@@ -165,7 +170,8 @@ fn share(
     least.is_finite().then_some(least)
 }
 
-/// The drive's force that the nominal model alone asks for, on every recording's grid: its laws so far are small beside it.
+/// The drive's force that the nominal model alone asks for, on every recording's grid: its laws so
+/// far are small beside it.
 fn predictions(sights: &[Sight], coefficients: &[f64]) -> Vec<Vec<f64>> {
     sights
         .iter()

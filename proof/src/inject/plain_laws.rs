@@ -1,5 +1,5 @@
-//! The laws that the plain rival knows, each on a small grid of shapes, as one or two columns that stand where the drive's
-//! force stands: what the drive has to give more.
+//! The laws that the plain rival knows, each on a small grid of shapes, as one or two columns that
+//! stand where the drive's force stands: what the drive has to give more.
 
 use std::f64::consts::TAU;
 

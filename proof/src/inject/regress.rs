@@ -1,4 +1,5 @@
-//! Least squares of the equation of motion in one band: k·u on the nominal columns and those of laws.
+//! Least squares of the equation of motion in one band: k·u on the nominal columns and those of
+//! laws.
 
 use crate::signal::{Normal, rms};
 

@@ -1,4 +1,5 @@
-//! The rig file of a carrier: the numbers that the concealing needs, and its text, in which single values can be changed.
+//! The rig file of a carrier: the numbers that the concealing needs, and its text, in which single
+//! values can be changed.
 
 use toml::{Table, Value};
 
@@ -59,7 +60,7 @@ impl RigFile {
         })
     }
 
-    /// The text with another value for a key of a section; as it stands where the key is missing.
+    /// The text with another value for a key of a section; unchanged where the key is missing.
     pub(crate) fn text_with(&self, section: &str, key: &str, value: f64) -> String {
         let mut inside = String::new();
         let mut out = String::with_capacity(self.text.len());

@@ -1,5 +1,5 @@
-//! The laws of the effects that are concealed, written from the physics; the diagnosis has its own. Each law but for its
-//! size, and how a machine's recordings draw it.
+//! The laws of the effects that are concealed, written from the physics; the diagnosis has its own.
+//! Each law but for its size, and how a machine's recordings draw it.
 
 use std::f64::consts::TAU;
 
@@ -7,7 +7,8 @@ use super::carrier::Carrier;
 use super::sight::State;
 use crate::rng::Rng;
 
-/// A wave along the travel: cycles a turn, share of the amplitude, phase at the recording's zero, rad.
+/// A wave along the travel: cycles a turn, share of the amplitude, phase at the recording's zero,
+/// rad.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Wave {
     pub(crate) order: f64,
@@ -56,7 +57,8 @@ pub(crate) enum Law {
     WarmingUp(f64),
     Cogging(Vec<Wave>),
     Imbalance,
-    /// Share of the stiffness that grows with the square of the distance, at the ends of the travel.
+    /// Share of the stiffness that grows with the square of the distance, at the ends of the
+    /// travel.
     Spring(f64),
     Weight,
     /// Maps of the command: size is the share of the force, …
@@ -69,7 +71,8 @@ pub(crate) enum Law {
     Delay,
     /// … s, …
     Lag,
-    /// … the part that the gain loses; its time constant, s, and whether it follows the heat of the current.
+    /// … the part that the gain loses; its time constant, s, and whether it follows the heat of the
+    /// current.
     Heating {
         seconds: f64,
         by_current: bool,
@@ -91,8 +94,8 @@ pub(crate) enum Side {
     Reading,
 }
 
-/// The names of the contract that are concealed. Gaps, springs and slip between two masses are not: a recording of the
-/// motor does not tell what the load did.
+/// The names of the contract that are concealed. Gaps, springs and slip between two masses are not:
+/// a recording of the motor does not tell what the load did.
 pub(crate) const NAMES: [&str; 22] = [
     "viscous_friction",
     "coulomb_friction",
@@ -232,7 +235,8 @@ fn typical_stroke(states: &[State]) -> f64 {
     crate::stats::quantile(&strokes, 0.5).unwrap_or(most)
 }
 
-/// One to three harmonics of a slot or pole number, of which a recording shows three periods and the rows show the wave.
+/// One to three harmonics of a slot or pole number, of which a recording shows three periods and
+/// the rows show the wave.
 fn waves(turns: f64, turns_a_second: f64, carrier: &Carrier, rng: &mut Rng) -> Option<Vec<Wave>> {
     let rate = |r: &crate::dynamics::recording::Recording| {
         (r.time.len() - 1) as f64 / (r.time[r.time.len() - 1] - r.time[0])

@@ -1,5 +1,5 @@
-//! A machine's motion, estimated from the recording alone: position and speed at the rows, for the laws, and every column of
-//! the equation of motion through one low-pass, for regressions.
+//! A machine's motion, estimated from the recording alone: position and speed at the rows, for the
+//! laws, and every column of the equation of motion through one low-pass, for regressions.
 
 use super::rig_file::RigFile;
 use crate::dynamics::motion::{cells, cubic, directions, first, second};
@@ -9,7 +9,8 @@ use crate::signal::low_pass;
 /// Part of the sampling rate below which regressions look, and the least of it, Hz.
 const BAND_SHARE: f64 = 0.03;
 const LEAST_BAND_HZ: f64 = 5.0;
-/// The speed that laws see is taken in the widest band in which counts make it err by this part of the fastest speed.
+/// The speed that laws see is taken in the widest band in which counts make it err by this part of
+/// the fastest speed.
 const SPEED_ERROR: f64 = 0.01;
 /// Slower than this part of the fast speed is at rest.
 const REST: f64 = 0.004;
@@ -93,8 +94,8 @@ impl State {
     }
 }
 
-/// One recording's equation of motion in one band, at rows that move, thinned to the band. Every column has its mean taken
-/// off: an offset is each recording's own.
+/// One recording's equation of motion in one band, at rows that move, thinned to the band. Every
+/// column has its mean taken off: an offset is each recording's own.
 #[derive(Clone, Debug)]
 pub(crate) struct Sight {
     rate: f64,
@@ -178,7 +179,8 @@ impl Sight {
         sight
     }
 
-    /// A column in the band on the whole grid. Rows at rest pass as nothing: what holds there is a reaction.
+    /// A column in the band on the whole grid. Rows at rest pass as nothing: what holds there is a
+    /// reaction.
     pub(crate) fn filter(&self, column: &[f64]) -> Vec<f64> {
         let masked: Vec<f64> =
             column.iter().zip(&self.rest).map(|(x, rest)| if *rest { 0.0 } else { *x }).collect();

@@ -1,5 +1,6 @@
-//! The diagnosis of every carrier as it is: what its model leaves, which is the measure of what is concealed, and what it
-//! names, which is not false later. Kept in a working folder, for it takes as long as the cases.
+//! The diagnosis of every carrier as it is: what its model leaves, which is the measure of what is
+//! concealed, and what it names, which is not false later. Kept in a working folder, for it takes
+//! as long as the cases.
 
 use std::path::{Path, PathBuf};
 
@@ -36,7 +37,8 @@ pub(crate) fn tool_mark(line: Option<&str>) -> String {
     std::env::current_exe().map(|exe| tool::mark(&exe)).unwrap_or_default()
 }
 
-/// Asks the tool about the carrier, or reads what it said before. `fixed`: reports that count whatever made them.
+/// Asks the tool about the carrier, or reads what it said before. `fixed`: reports that count
+/// whatever made them.
 ///
 /// # Errors
 /// Why there is no fit.

@@ -156,7 +156,7 @@ impl<'a> Lines<'a> {
     }
 
     fn put_detected(&mut self) {
-        let measure = "kinds that the tool has a detector for: no name, told as such";
+        let measure = "kinds that the tool has a detector for: no name, reported as such";
         self.put_foreign(true, "detector_abstains", measure, "–", Record::abstains);
         let measure = "… confidently wrong (≥ 0.8)";
         self.put_foreign(true, "detector_confident", measure, "–", |r| confident(r, CONFIDENT));

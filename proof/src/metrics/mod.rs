@@ -45,7 +45,8 @@ pub(crate) struct Metrics {
     pub(crate) by_pair: BTreeMap<String, [Rate; 2]>,
     pub(crate) by_parameter: BTreeMap<String, Rate>,
     pub(crate) reliability: Reliability,
-    /// (what was hidden, what was answered first) → how often; single effects at strengths 10 and 3 only.
+    /// (what was hidden, what was answered first) → how often; single effects at strengths 10 and 3
+    /// only.
     pub(crate) confusion: BTreeMap<(String, String), usize>,
     pub(crate) rivals: Vec<BaselineMetrics>,
     pub(crate) failures: usize,

@@ -1,12 +1,14 @@
-//! Answers of an earlier run of the same seed into the same folder: a run that was stopped goes on where it was.
+//! Answers of an earlier run of the same seed into the same folder: a run that was stopped goes on
+//! where it was.
 
 use super::{Answer, names};
 use crate::options::Options;
 use serde_json::Value;
 use std::collections::BTreeMap;
 
-/// Answers per plant in the `settle.json` of the folder of `--out`; none if there is no such file, if it is of another seed, of
-/// other inputs or of another program, or if only some plants are asked for: these are settled anew.
+/// Answers per plant in the `settle.json` of the folder of `--out`; none if there is no such file,
+/// if it is of another seed, of other inputs or of another program, or if only some plants are
+/// asked for: these are settled anew.
 pub(super) fn answers(options: &Options, program: &str) -> BTreeMap<usize, Vec<Answer>> {
     if options.only.is_some() {
         return BTreeMap::new();

@@ -7,8 +7,9 @@ use std::path::Path;
 /// The list of the plants in their folder.
 pub(super) const KEY: &str = "key.json";
 
-/// Reads the plants of a folder. `key.json` holds `plants`, each with its `file`, its `kind` (twins, singles, pairs, nulls or outside) and
-/// the `names` that are right, none where nothing is to be named.
+/// Reads the plants of a folder. `key.json` holds `plants`, each with its `file`, its `kind`
+/// (twins, singles, pairs, nulls or outside) and the `names` that are right, none where nothing is
+/// to be named.
 ///
 /// # Errors
 /// One sentence: the file, the plant, and what is wrong with it.
@@ -28,7 +29,7 @@ pub(super) fn plants(folder: &Path) -> Result<Vec<Plant>, String> {
 fn read(folder: &Path, plant: &Value) -> Result<Plant, String> {
     let file = plant["file"].as_str().ok_or("it has no `file`")?;
     let kind = plant["kind"].as_str().and_then(Kind::of);
-    let kind = kind.ok_or("its `kind` is none of twins, singles, pairs, nulls and outside")?;
+    let kind = kind.ok_or("its `kind` is not one of twins, singles, pairs, nulls and outside")?;
     let names = plant["names"].as_array().ok_or("it has no list `names`")?;
     let names = names.iter().map(|name| Ok(name.as_str().ok_or("a name is no text")?.to_owned()));
     let toml = std::fs::read_to_string(folder.join(file)).map_err(|cause| format!("{file}: {cause}"))?;

@@ -1,5 +1,6 @@
-//! `--settle`: plants concealed in the virtual device, which `host-sim settle` is to name; beside it, in the same time of motion, random
-//! multisines, the set of `characterise`, and strokes as in practice.
+//! `--settle`: plants concealed in the virtual device, which `host-sim settle` is to name; beside
+//! it, in the same time of motion, random multisines, the set of `characterise`, and strokes as in
+//! practice.
 
 mod earlier;
 mod given;
@@ -155,7 +156,8 @@ pub(crate) fn run(options: &Options) -> Result<(), String> {
         all.sort_by_key(|plant| plant.index);
         write(options, &all, count, &mark)
     };
-    // A report that cannot be written now is tried again after the next plant; the last failure is told.
+    // A report that cannot be written now is tried again after the next plant; the last failure is
+    // told.
     let save = |new: &[Option<Judged>]| drop(write_all(new));
     let new = pool::map_and_save(options.jobs, options.budget(), "settled", &left, work, save);
     print!("{}", write_all(&new)?);
@@ -190,7 +192,8 @@ fn write(options: &Options, judged: &[&Judged], count: usize, mark: &str) -> Res
     Ok(text)
 }
 
-/// True if `only` is the folder of plant `index`, or a part of its kind or of its effects; all are wanted if it is absent.
+/// True if `only` is the folder of plant `index`, or a part of its kind or of its effects; all are
+/// wanted if it is absent.
 fn is_wanted(only: Option<&str>, index: usize, plant: &Plant) -> bool {
     only.is_none_or(|text| {
         let number = text.strip_prefix("plant-").and_then(|number| number.parse().ok());

@@ -1,5 +1,5 @@
-//! Plants to conceal in the virtual device, as rig files. They are drawn without any knowledge of how experiments are designed: this
-//! file knows names of effects and sizes, and a rig as text.
+//! Plants to conceal in the virtual device, as rig files. They are drawn without any knowledge of
+//! how experiments are designed: this file knows names of effects and sizes, and a rig as text.
 
 use crate::rng::Rng;
 use std::fmt::Write as _;
@@ -67,7 +67,8 @@ const TWINS: [&str; 16] = [
     "command_delay",
 ];
 const SINGLES: [&str; 4] = ["cogging", "torque_ripple", "command_deadband", "asymmetric_friction"];
-/// Kinds in turn: of twelve plants six have a twin, two have none, two hold a pair, one is a null and one is outside.
+/// Kinds in turn: of twelve plants six have a twin, two have none, two hold a pair, one is a null
+/// and one is outside.
 const TURN: [Kind; 12] = [
     Kind::Twin,
     Kind::Single,
@@ -139,7 +140,8 @@ pub(crate) fn draw(base: &Base, seed: u64, index: usize) -> Plant {
         Kind::Outside => (Vec::new(), outside(base, &mut rng)),
     };
     let mut toml = String::from("format = 1\nname = \"concealed\"\nkind = \"rotary\"\n[model]\n");
-    // Within what the rig declares: a third of 15 % for the inertia, a quarter of 50 % for friction.
+    // Within what the rig declares: a third of 15 % for the inertia, a quarter of 50 % for
+    // friction.
     let near = |rng: &mut Rng, part: f64| 1.0 + part * rng.bounded_normal(2.0);
     let _ = writeln!(toml, "inertia = {:e}", base.inertia * near(&mut rng, 0.05));
     let _ = writeln!(toml, "viscous = {:e}", base.viscous * near(&mut rng, 0.12));
@@ -173,7 +175,8 @@ fn named(names: &[&str], base: &Base, rng: &mut Rng) -> (Vec<String>, String) {
     )
 }
 
-/// The text of an effect of the library, of a size that is a part of the dry friction or of the drive.
+/// The text of an effect of the library, of a size that is a part of the dry friction or of the
+/// drive.
 fn effect(name: &str, base: &Base, rng: &mut Rng) -> String {
     let force = base.dry * rng.log_range(0.15, 0.6);
     let phase = rng.range(0.0, std::f64::consts::TAU);

@@ -34,7 +34,8 @@ impl Amplifier {
         level || self == Self::LineHigh
     }
 
-    /// The voltage of its current monitor in mV, of a full scale of `full_scale`: as the set value, mid-scale is none.
+    /// The voltage of its current monitor in mV, of a full scale of `full_scale`: as for the set
+    /// value, mid-scale is zero.
     pub(super) fn monitor(self, asked: Drive, full_scale: u32) -> u32 {
         let drive = self.drive(asked);
         let code = if drive.enabled { drive.code.unwrap_or(2_048) } else { 2_048 };

@@ -1,5 +1,6 @@
-//! The bus between the emulator's core and the rest of the board: addresses of peripherals that the emulator has no model for
-//! lead to windows where the board has one, and the flash's sectors that the firmware writes are the board's own.
+//! The bus between the emulator's core and the rest of the board: addresses of peripherals that the
+//! emulator has no model for lead to windows where the board has one, and the flash's sectors that
+//! the firmware writes are the board's own.
 
 use rigless::emulator::{Access, AccessKind, Checked, CoreBus, InterruptLine, Queued};
 use rigless::time::VirtualNanos;
@@ -29,8 +30,9 @@ fn window(address: u64) -> u64 {
 /// The converter's holding register for twelve bits, right aligned (RM0090 14.5.3).
 const CONVERTER_CODE: u64 = 0x4000_7408;
 
-/// The part's reserved space between its RAM with the RAM's bits and its peripherals (RM0090 2.3): an access fails on the bus, and the
-/// core takes a fault (ARMv7-M B3.2.15, `PRECISERR`). The emulator answers zero by itself.
+/// The part's reserved space between its RAM with the RAM's bits and its peripherals (RM0090 2.3):
+/// an access fails on the bus, and the core takes a fault (ARMv7-M B3.2.15, `PRECISERR`). The
+/// emulator answers zero by itself.
 const RESERVED: [std::ops::Range<u64>; 2] = [0x2010_0000..0x2200_0000, 0x2400_0000..0x4000_0000];
 
 /// The part's identity.
@@ -41,7 +43,8 @@ pub(super) struct Rerouted<'a> {
     pub(super) bus: &'a mut dyn CoreBus,
     pub(super) flash: &'a Flash,
     pub(super) stalled: u64,
-    /// Instructions' time for which the flash, being erased, has kept the core waiting in this stretch.
+    /// Instructions' time for which the flash, being erased, has kept the core waiting in this
+    /// stretch.
     pub(super) standstill: u64,
     pub(super) shorted: Option<PartPin>,
     pub(super) identity: Option<u32>,

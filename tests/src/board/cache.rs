@@ -1,15 +1,16 @@
-//! The instruction cache of the flash (RM0090 3.5.2, adaptive real-time memory accelerator): 64 lines of 128 bits, the one that was
-//! used longest ago exchanged first. Counts the lines that have to come from the flash.
+//! The instruction cache of the flash (RM0090 3.5.2, adaptive real-time memory accelerator): 64
+//! lines of 128 bits, the one that was used longest ago exchanged first. Counts the lines that have
+//! to come from the flash.
 //!
-//! The emulator takes the same time for each instruction. This says what it leaves out: how often the core waits for the
-//! flash when an interrupt finds none of its code in the cache.
+//! The emulator takes the same time for each instruction. This says what it leaves out: how often
+//! the core waits for the flash when an interrupt finds none of its code in the cache.
 
 /// Bytes of a line.
 const LINE_BYTES: u32 = 16;
 /// Lines.
 const LINES: usize = 64;
-/// Cycles that the core waits for a line at 168 MHz on a supply of less than 2.7 V (RM0090 3.5.1, table 10). Without prefetch; with it,
-/// lines that follow one another wait for less.
+/// Cycles that the core waits for a line at 168 MHz on a supply of less than 2.7 V (RM0090 3.5.1,
+/// table 10). Without prefetch; with it, lines that follow one another wait for less.
 pub const WAIT_CYCLES: u32 = 6;
 
 /// The cache's content, and a count of what it lacked.
@@ -21,8 +22,8 @@ pub(super) struct InstructionCache {
 }
 
 impl InstructionCache {
-    /// Takes the fetch of the instruction at `address`. The second half of one that ends in the next line is left out: what follows
-    /// it fetches that line, unless it branches.
+    /// Takes the fetch of the instruction at `address`. The second half of one that ends in the
+    /// next line is left out: what follows it fetches that line, unless it branches.
     pub(super) fn fetch(&mut self, address: u32) {
         let line = address / LINE_BYTES;
         if let Some(place) = self.lines.iter().rposition(|&held| held == line) {

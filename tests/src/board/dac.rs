@@ -1,11 +1,12 @@
 //! Channel 1 of the digital-to-analogue converter, RM0090 chapter 14: a code in, a pin out.
 //!
-//! What the part does not promise, it does not do here: the trigger's selection stays as it was while the channel is
-//! enabled (14.3.6), a code that waits goes out with its trigger and no other way (14.3.4), and the output buffer, which
-//! is on out of reset (14.3.2), does not come nearer to either rail than 0.2 V (data sheet DS8626, DAC characteristics).
+//! What the part does not promise, it does not do here: the trigger's selection stays as it was
+//! while the channel is enabled (14.3.6), a code that waits goes out with its trigger and no other
+//! way (14.3.4), and the output buffer, which is on out of reset (14.3.2), does not come nearer to
+//! either rail than 0.2 V (data sheet DS8626, DAC characteristics).
 //!
-//! Left out: DMA, wave generation, channel 2's pin, and the three or so APB clocks from a write or a
-//! trigger to the output. A trigger from a timer is the board's to bring: [`Dac::trigger`].
+//! Left out: DMA, wave generation, channel 2's pin, and the three or so APB clocks from a write or
+//! a trigger to the output. A trigger from a timer is the board's to bring: [`Dac::trigger`].
 
 use rigless::chip::parallel::Peer;
 use rigless::device::DeviceContext;

@@ -62,8 +62,9 @@ fn code(bytes: &[u8], address: u32) -> Option<&[u8]> {
     bytes.get((offset + address - begin) as usize..(offset + size) as usize)
 }
 
-/// The instructions by which the function at `address` may return, its own and those of functions that it jumps to as its
-/// last act; none where there is no such function. ARMv7-M manual, A7.7: `bx lr`, `pop {…, pc}`, `ldr pc, [sp], #4`, `b`.
+/// The instructions by which the function at `address` may return, its own and those of functions
+/// that it jumps to as its last act; none where there is no such function. ARMv7-M manual, A7.7:
+/// `bx lr`, `pop {…, pc}`, `ldr pc, [sp], #4`, `b`.
 #[must_use]
 pub fn exits(bytes: &[u8], symbols: &[Symbol], address: u32) -> Vec<u32> {
     let (mut exits, mut seen, mut open) = (vec![], vec![], vec![address]);

@@ -1,5 +1,5 @@
-//! The external interrupt controller, RM0090 chapter 12, as far as the supply's voltage detector needs it: line 16, its
-//! edges and its interrupt.
+//! The external interrupt controller, RM0090 chapter 12, as far as the supply's voltage detector
+//! needs it: line 16, its edges and its interrupt.
 
 use rigless::chip::parallel::Peer;
 use rigless::device::{DeviceContext, Level};

@@ -1,11 +1,12 @@
 //! The sectors of flash that a firmware writes to, which the emulator keeps read only.
 //!
-//! Words are programmed and sectors erased under the rules of RM0090 section 3.6: both keys in their order, `PG` or
-//! `SER` set with as many bits at a time as the supply allows (3.6.2), and a bit goes from one to zero only. `LOCK` is set out of reset and a write
-//! with it set locks whatever else it says (3.9.7); `STRT` in a locked register does nothing and reports nothing. While
-//! a sector is erased the core gets no instruction from the flash (3.6: "any attempt to read … causes the bus to
-//! stall"): for its whole time nothing runs, the watchdog excepted. The interface's registers stay the emulator's; this
-//! model watches what is written to them.
+//! Words are programmed and sectors erased under the rules of RM0090 section 3.6: both keys in
+//! their order, `PG` or `SER` set with as many bits at a time as the supply allows (3.6.2), and a
+//! bit goes from one to zero only. `LOCK` is set out of reset and a write with it set locks
+//! whatever else it says (3.9.7); `STRT` in a locked register does nothing and reports nothing.
+//! While a sector is erased the core gets no instruction from the flash (3.6: "any attempt to read
+//! … causes the bus to stall"): for its whole time nothing runs, the watchdog excepted. The
+//! interface's registers stay the emulator's; this model watches what is written to them.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -30,11 +31,11 @@ const STRT: u32 = 1 << 16;
 const LOCK: u32 = 1 << 31;
 const KEY1: u32 = 0x4567_0123;
 const KEY2: u32 = 0xCDEF_89AB;
-/// Bytes at a time by `PSIZE`, and the supply in millivolts that they need at least (3.6.2; 8 at a time asks for a supply of
-/// its own).
+/// Bytes at a time by `PSIZE`, and the supply in millivolts that they need at least (3.6.2; 8 at a
+/// time asks for a supply of its own).
 const PARALLEL: [(u32, u32); 3] = [(1, 1_800), (2, 2_100), (4, 2_700)];
-/// Time in which a sector of 128 KiB is erased, by the bytes at a time (data sheet DS8626, flash memory programming, typical; twice
-/// that at most).
+/// Time in which a sector of 128 KiB is erased, by the bytes at a time (data sheet DS8626, flash
+/// memory programming, typical; twice that at most).
 const fn erase_nanos(parallel_bytes: u32) -> u64 {
     match parallel_bytes {
         1 => 2_000_000_000,
@@ -50,7 +51,8 @@ const LARGE: u64 = 0x2_0000;
 pub(super) const SLOT_BYTES: u64 = LARGE;
 /// The sectors of the configuration: the last two of one megabyte.
 pub const CONFIGURATION: std::ops::Range<u64> = 0x080C_0000..0x0810_0000;
-/// The sectors that a firmware may write: the configuration's and the two before them, which the board's own test uses.
+/// The sectors that a firmware may write: the configuration's and the two before them, which the
+/// board's own test uses.
 pub(super) const WRITABLE: std::ops::Range<u64> = 0x0808_0000..0x0810_0000;
 const ERASED: u32 = u32::MAX;
 
@@ -137,7 +139,8 @@ impl Array {
         self.words.range(CONFIGURATION).map(|(&address, &word)| (address, word)).collect()
     }
 
-    /// True if the supply lasts for the next operation; the one for which it does not cuts the supply.
+    /// True if the supply lasts for the next operation; the one for which it does not cuts the
+    /// supply.
     fn powered(&mut self) -> bool {
         if self.cut_before == Some(self.operations) {
             self.cut_before = None;
@@ -201,8 +204,8 @@ impl Array {
         }
     }
 
-    /// A write of the firmware to a register, which may be the interface's, at the instant `at`. The time for which the
-    /// core then stands still, in nanoseconds.
+    /// A write of the firmware to a register, which may be the interface's, at the instant `at`.
+    /// The time for which the core then stands still, in nanoseconds.
     pub(super) fn register_written(&mut self, address: u64, value: u32, at: u64) -> u64 {
         match address {
             FLASH_KEYR => {
@@ -324,7 +327,11 @@ mod tests {
         assert_eq!(array.register_written(FLASH_CR, WORDS | SER | STRT | 10 << 3, 0), 0);
         assert_eq!((array.word(CELL), array.violations.len()), (0, 0));
         array.register_written(FLASH_KEYR, KEY2, 0);
-        assert_eq!(array.register_written(FLASH_CR, WORDS | SER | STRT | 10 << 3, 0), 0, "one key is none");
+        assert_eq!(
+            array.register_written(FLASH_CR, WORDS | SER | STRT | 10 << 3, 0),
+            0,
+            "one key does not unlock"
+        );
     }
 
     #[test]

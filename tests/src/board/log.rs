@@ -1,8 +1,10 @@
-//! The firmware's log: `defmt` frames of its terminal, read with the format strings that its image holds.
+//! The firmware's log: `defmt` frames of its terminal, read with the format strings that its image
+//! holds.
 //!
-//! The official decoder gives `serde_json` a feature that changes how numbers in tagged messages are read, for every crate
-//! that is built beside it, so that the tests would need a second build of everything. The parser of the format strings and
-//! the framing are the official crates; frames hold an index, then the arguments (the defmt book, "Encoding").
+//! The official decoder gives `serde_json` a feature that changes how numbers in tagged messages
+//! are read, for every crate that is built beside it, so that the tests would need a second build
+//! of everything. The parser of the format strings and the framing are the official crates; frames
+//! hold an index, then the arguments (the defmt book, "Encoding").
 
 use std::collections::BTreeMap;
 

@@ -1,7 +1,8 @@
 //! A board for the emulator: the part, its clock and rail, the chips and the cable.
 //!
-//! The emulator's part is the STM32F427: the STM32F429 without its display controller, and it has everything of the STM32F407
-//! that the firmware uses at the same addresses, and more memory than that image is linked for.
+//! The emulator's part is the STM32F427: the STM32F429 without its display controller, and it has
+//! everything of the STM32F407 that the firmware uses at the same addresses, and more memory than
+//! that image is linked for.
 
 use std::num::{NonZeroU32, NonZeroU64};
 use std::sync::Arc;

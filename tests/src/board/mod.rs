@@ -1,5 +1,5 @@
-//! The emulated board: a flash image, unmodified, on an STM32F4 with a plant on its pins, a tilt sensor and a USB host on its
-//! cable. Which board: [`pins`].
+//! The emulated board: a flash image, unmodified, on an STM32F4 with a plant on its pins, a tilt
+//! sensor and a USB host on its cable. Which board: [`pins`].
 //!
 //! Everything that knows the emulator stays in this module; a test sees pins, a shaft, a cable and
 //! virtual time. The clock is one instruction a cycle at 168 MHz: it proves order, rates and
@@ -114,7 +114,8 @@ pub struct Wiring {
     pub set_value: SetValue,
     /// The accelerometer, if any.
     pub tilt: Option<tilt::Model>,
-    /// True if an analogue inclinometer and its strap are fitted, level until [`Stopped::set_analogue`] changes it.
+    /// True if an analogue inclinometer and its strap are fitted, level until
+    /// [`Stopped::set_analogue`] changes it.
     pub inclinometer: bool,
     /// True if the encoder's supply is sensed.
     pub supply_sense: bool,
@@ -320,7 +321,8 @@ impl Board {
         self.probe.tally().counted = Some(Counted { entry, exits });
     }
 
-    /// The same, and counts the lines of its code that come from the flash, which takes an instruction at a time.
+    /// The same, and counts the lines of its code that come from the flash, which takes an
+    /// instruction at a time.
     ///
     /// # Panics
     ///

@@ -1,5 +1,5 @@
-//! The connections of the part's pins: one value for each board that there is an image for, read from its manual and from
-//! `docs/hardware.md`, not from the firmware.
+//! The connections of the part's pins: one value for each board that there is an image for, read
+//! from its manual and from `docs/hardware.md`, not from the firmware.
 
 /// A pin of the part: its port, 0 for A, and its number in the port.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -55,7 +55,8 @@ pub struct Pins {
     pub tracks: [PartPin; 2],
     /// The pin that senses the encoder's supply.
     pub encoder_supply: PartPin,
-    /// The emergency stop's loop, the amplifier's ready output, and the strap of its current monitor: closed to the supply.
+    /// The emergency stop's loop, the amplifier's ready output, and the strap of its current
+    /// monitor: closed to the supply.
     pub drive_lines: [PartPin; 3],
     /// The lamps: running, torque is on, a fault.
     pub lamps: [PartPin; 3],

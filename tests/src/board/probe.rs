@@ -21,7 +21,8 @@ pub struct HandlerRun {
 pub struct ToCode {
     /// The number of instructions.
     pub instructions: u32,
-    /// The number of lines of code that came from the flash, with an empty cache at the first instruction.
+    /// The number of lines of code that came from the flash, with an empty cache at the first
+    /// instruction.
     pub lines: u32,
 }
 
@@ -63,7 +64,8 @@ pub struct Tally {
     pub runs: Vec<HandlerRun>,
     /// True if the lines of its code are counted, too, which takes an instruction at a time.
     pub count_lines: bool,
-    /// The addresses at which the image masks all interrupts (PRIMASK, `true`) and restores the previous state.
+    /// The addresses at which the image masks all interrupts (PRIMASK, `true`) and restores the
+    /// previous state.
     pub masks: BTreeMap<u32, bool>,
     /// The instruction count at which interrupts were masked, and how many times one in the other.
     pub(super) masked_since: u64,

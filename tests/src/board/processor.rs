@@ -1,5 +1,6 @@
-//! The emulator's core with three things added: its accesses go over the board's own bus (`bus`), the instructions of
-//! one interrupt handler can be counted, and a fault can be injected by moving the program counter.
+//! The emulator's core with three things added: its accesses go over the board's own bus (`bus`),
+//! the instructions of one interrupt handler can be counted, and a fault can be injected by moving
+//! the program counter.
 //!
 //! Nothing here changes what the firmware sees: the bus answers at the addresses of the manual.
 
@@ -86,7 +87,8 @@ impl Probed {
         self.breakpoints = wanted.into_iter().filter(|&new| self.core.add_breakpoint(new.into())).collect();
     }
 
-    /// Runs like the core from breakpoint to breakpoint, and an instruction at a time while an upset is to come.
+    /// Runs like the core from breakpoint to breakpoint, and an instruction at a time while an
+    /// upset is to come.
     fn run_watched(&mut self, budget: u32, bus: &mut Rerouted<'_>) -> (Exit, u64) {
         let mut retired = 0;
         while retired < u64::from(budget) {
@@ -160,8 +162,8 @@ impl Probed {
         }
     }
 
-    /// Ends the run of the counted handler once the exception has changed, which the instruction that just ran at a
-    /// breakpoint, `place`, does.
+    /// Ends the run of the counted handler once the exception has changed, which the instruction
+    /// that just ran at a breakpoint, `place`, does.
     ///
     /// # Panics
     ///
@@ -177,7 +179,8 @@ impl Probed {
         tally.runs.push(HandlerRun { from: run.from, instructions, to_code: run.to_code });
     }
 
-    /// Notes that the instruction at `place` has masked interrupts or let them come again, if it is one of those.
+    /// Notes that the instruction at `place` has masked interrupts or let them come again, if it is
+    /// one of those.
     fn note_mask(&mut self, place: u32) {
         let now = self.retired();
         let mut tally = self.probe.tally();

@@ -5,7 +5,8 @@ use firmware::store::{CELL_WORDS, ConfigFlash, Slot, Store, StoreError};
 
 use super::flash::{Array, CONFIGURATION, SLOT_BYTES};
 
-/// The array as the store sees it, without the rules of its registers: what a programmer does before the board is switched on.
+/// The array as the store sees it, without the rules of its registers: what a programmer does
+/// before the board is switched on.
 struct Cells<'a>(&'a mut Array);
 
 fn address(slot: Slot, index: usize) -> u64 {

@@ -79,7 +79,8 @@ impl Accelerometer {
         self.address = None;
     }
 
-    /// True if it measures: LIS302DL `PD` set (data sheet 7.2), LIS3DSH `ODR` not zero (data sheet 8.5).
+    /// True if it measures: LIS302DL `PD` set (data sheet 7.2), LIS3DSH `ODR` not zero (data sheet
+    /// 8.5).
     fn is_awake(&self) -> bool {
         let control = self.registers[usize::from(CONTROL)];
         match self.model {
@@ -88,7 +89,8 @@ impl Accelerometer {
         }
     }
 
-    /// A chip on a needle that points 30° down, as a hand holds it to a vein: X, along the needle, measures half a gravity.
+    /// A chip on a needle that points 30° down, as a hand holds it to a vein: X, along the needle,
+    /// measures half a gravity.
     #[must_use]
     pub fn new(model: Model) -> Self {
         let mut chip = Self {

@@ -1,5 +1,6 @@
-//! The encoder at the part: what its wires bring to the pins, what the pins' pulls make of a wire that is off, and what of it the
-//! timer hears. A timer hears a pin only where the port's multiplexer leads there (RM0090 8.3.2); else its input is low.
+//! The encoder at the part: what its wires bring to the pins, what the pins' pulls make of a wire
+//! that is off, and what of it the timer hears. A timer hears a pin only where the port's
+//! multiplexer leads there (RM0090 8.3.2); else its input is low.
 
 use rigless::device::Level;
 use rigless::session::Session;
@@ -13,8 +14,8 @@ use super::plant::{Encoder, Nanos};
 use super::wires::Wires;
 use super::{Timer, Wiring};
 
-/// The time that a pull of 40 kΩ (data sheet DS8626, I/O static characteristics) takes to empty a pin with a wire on it: 100 pF
-/// through the level at which the input changes, with a margin.
+/// The time that a pull of 40 kΩ (data sheet DS8626, I/O static characteristics) takes to empty a
+/// pin with a wire on it: 100 pF through the level at which the input changes, with a margin.
 pub(super) const PULL_SETTLES: Nanos = 10_000;
 
 /// Both tracks.
@@ -50,7 +51,8 @@ impl Tracks {
         }
     }
 
-    /// Puts the tracks' levels on the pins, as the wires bring them, and the pins' levels on the timer.
+    /// Puts the tracks' levels on the pins, as the wires bring them, and the pins' levels on the
+    /// timer.
     pub(super) fn drive(&self, session: &mut Session<Machine>, at: Nanos) {
         let (at, part) = (VirtualNanos(at), session.board_mut().part());
         let drive = self.wires.drive(self.encoder.levels(), self.glitch_ends.is_some());

@@ -1,8 +1,10 @@
-//! Cores that have run before: what the emulator once translated of an image serves every later board with that image.
+//! Cores that have run before: what the emulator once translated of an image serves every later
+//! board with that image.
 //!
-//! Four fifths of the time of a short test went into translating thousands of blocks of the image anew. A core's state can be loaded into a
-//! core that has run, and what it translated stays (`Processor::load`); memory is mapped anew for each board. The emulator's own reset
-//! drops what was translated, so a reset is a load here, too.
+//! Four fifths of the time of a short test went into translating thousands of blocks of the image
+//! anew. A core's state can be loaded into a core that has run, and what it translated stays
+//! (`Processor::load`); memory is mapped anew for each board. The emulator's own reset drops what
+//! was translated, so a reset is a load here, too.
 
 use rigless::device::Level;
 use rigless::emulator::{CoreBus, Error, Exit, InterruptLine, Processor, Queued};
@@ -10,7 +12,8 @@ use std::collections::BTreeMap;
 use std::ops::{Deref, DerefMut, Range};
 use std::sync::{Mutex, PoisonError};
 
-/// The part's memory that programs write to: what was translated of it is of the board that ran (RM0090 2.3).
+/// The part's memory that programs write to: what was translated of it is of the board that ran
+/// (RM0090 2.3).
 const RAM: [Range<u64>; 2] = [0x1000_0000..0x1001_0000, 0x2000_0000..0x2003_0000];
 /// The part's flash, at its address and where it begins the address space.
 const CODE: [Range<u64>; 2] = [0x0000_0000..0x0020_0000, 0x0800_0000..0x0820_0000];
@@ -52,7 +55,8 @@ pub(super) struct WarmCore {
     /// The interrupt lines that are high, which a reset of the core does not change.
     high: Vec<InterruptLine>,
     has_run: bool,
-    /// True if code in flash was written over since, so that its translations may be of another image.
+    /// True if code in flash was written over since, so that its translations may be of another
+    /// image.
     is_tainted: bool,
 }
 
@@ -96,8 +100,8 @@ impl WarmCore {
         self.deref_mut().run(budget, bus)
     }
 
-    /// Resets it, and keeps what it translated unless code was written over. Its count of retired instructions begins again then: the answer
-    /// is where it stood, and 0 if it goes on.
+    /// Resets it, and keeps what it translated unless code was written over. Its count of retired
+    /// instructions begins again then: the answer is where it stood, and 0 if it goes on.
     pub(super) fn reset(&mut self) -> u64 {
         let is_tainted = self.is_tainted;
         let core = self.core.as_mut().expect("lent until it is dropped");
@@ -120,8 +124,8 @@ impl WarmCore {
         }
     }
 
-    /// Notes what a board asks of the core. False if it is the image on its way to the flash, before the first instruction: the core has
-    /// run the same one.
+    /// Notes what a board asks of the core. False if it is the image on its way to the flash,
+    /// before the first instruction: the core has run the same one.
     pub(super) fn must_know(&mut self, queued: Queued) -> bool {
         match queued {
             Queued::Route(page) => self.routed.push(page),
@@ -222,7 +226,8 @@ impl Parking {
         assert!(self.0.is_empty() || self.0.len() >= most, "mapped memory may not move");
         self.0.resize(most.max(self.0.len()), Page { _bytes: [0; 4096] });
         for (start, length) in mapped {
-            // SAFETY: whole pages, aligned as `Page` is, which live as long as the processor beside them and are not written.
+            // SAFETY: whole pages, aligned as `Page` is, which live as long as the processor beside
+            // them and are not written.
             unsafe { processor.map(*start, *length, self.0.as_mut_ptr().cast(), false) };
         }
     }

@@ -32,11 +32,14 @@ pub struct Wires {
     pub b: Wire,
     /// True if each goes to the other's pin.
     pub swapped: bool,
-    /// Its supply wire is off: both outputs, without power, are held near ground by their protection diodes.
+    /// Its supply wire is off: both outputs, without power, are held near ground by their
+    /// protection diodes.
     pub supply_off: bool,
-    /// Its ground wire is off: what flows through it has no other way than its outputs, which are held near its supply.
+    /// Its ground wire is off: what flows through it has no other way than its outputs, which are
+    /// held near its supply.
     pub ground_off: bool,
-    /// Pulses of this many nanoseconds on both pins, one at every step of the plant, as the motor's PWM leads bring them.
+    /// Pulses of this many nanoseconds on both pins, one at every step of the plant, as the motor's
+    /// PWM leads bring them.
     pub glitches: Option<u64>,
 }
 

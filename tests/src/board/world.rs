@@ -332,7 +332,8 @@ impl World {
         }
     }
 
-    /// DS8626, ADC characteristics: at most 36 MHz, the second bus's clock by 2, 4, 6 or 8 (RM0090 13.13.16).
+    /// DS8626, ADC characteristics: at most 36 MHz, the second bus's clock by 2, 4, 6 or 8 (RM0090
+    /// 13.13.16).
     fn watch_converter(&mut self, session: &mut Session<Machine>, at: Nanos) {
         use rigless::mcu::Operate;
         let common = session.board_mut().mcu.peek(VirtualNanos(at), ADC_CCR, Width::W32).unwrap_or(0);
@@ -342,8 +343,8 @@ impl World {
         }
     }
 
-    /// The oscillator is switched on: it swings only where it is what the board's clock needs (RM0090 7.2.1). One that does not gives
-    /// the PLL nothing.
+    /// The oscillator is switched on: it swings only where it is what the board's clock needs
+    /// (RM0090 7.2.1). One that does not gives the PLL nothing.
     fn start_clock(&self, session: &mut Session<Machine>, control: u64) {
         let is_bypassed = control & HSEBYP != 0;
         let fits = is_bypassed == (self.wiring.pins.clock == Clock::Elsewhere);

@@ -1,4 +1,5 @@
-//! Chromium as a process of our own: a fresh profile, no screen, nothing in the background, ended with its test.
+//! Chromium as a process of our own: a fresh profile, no screen, nothing in the background, ended
+//! with its test.
 
 use super::Error;
 use super::devtools::DevTools;

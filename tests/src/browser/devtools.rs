@@ -1,4 +1,5 @@
-//! The DevTools protocol as far as a test needs it: a call and its answer, and the events that arrive in between.
+//! The DevTools protocol as far as a test needs it: a call and its answer, and the events that
+//! arrive in between.
 
 use super::Error;
 use serde_json::{Value, json};

@@ -1,7 +1,9 @@
-//! A real browser for the test of the page: Debian's Chromium without a screen, driven over its DevTools protocol.
+//! A real browser for the test of the page: Debian's Chromium without a screen, driven over its
+//! DevTools protocol.
 //!
-//! [`chromium`] starts and ends it, [`devtools`] speaks to it, [`page`] says what a test means: click, drag, read;
-//! [`program`] starts what serves the page, [`processor_time`] says what a picture costs. Nothing here knows what the page under test shows.
+//! [`chromium`] starts and ends it, [`devtools`] speaks to it, [`page`] says what a test means:
+//! click, drag, read; [`program`] starts what serves the page, [`processor_time`] says what a
+//! picture costs. Nothing here knows what the page under test shows.
 
 pub mod chromium;
 pub mod devtools;

@@ -89,7 +89,8 @@ impl Page {
         Ok((x, y))
     }
 
-    /// A mouse event as the system would send it: `mousePressed`, `mouseMoved` or `mouseReleased`, left button.
+    /// A mouse event as the system would send it: `mousePressed`, `mouseMoved` or `mouseReleased`,
+    /// left button.
     pub fn mouse(&mut self, kind: &str, (x, y): (f64, f64)) -> Result<(), Error> {
         let buttons = if kind == "mouseReleased" { 0 } else { 1 };
         let event =

@@ -1,5 +1,5 @@
-//! Processor time of the browser, in units of a loop timed on the same machine: a judgement of a picture's cost that holds on a
-//! slow machine as on a fast one.
+//! Processor time of the browser, in units of a loop timed on the same machine: a judgement of a
+//! picture's cost that holds on a slow machine as on a fast one.
 
 use super::Error;
 use super::chromium::Chromium;
@@ -8,14 +8,16 @@ use std::fs;
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
-/// Ticks of the kernel's clock a second in `/proc/*/stat` (`USER_HZ` of Linux on every architecture that Chromium is built for).
+/// Ticks of the kernel's clock a second in `/proc/*/stat` (`USER_HZ` of Linux on every architecture
+/// that Chromium is built for).
 const TICKS_PER_S: f64 = 100.0;
 /// Turns of the loop: some milliseconds.
 const TURNS: u64 = 4_000_000;
 const REPEATS: usize = 20;
 
 impl Chromium {
-    /// Seconds of processor time that the browser and all its processes have used, user's and kernel's.
+    /// Seconds of processor time that the browser and all its processes have used, user's and
+    /// kernel's.
     pub fn processor_s(&self) -> Result<f64, Error> {
         let processes = all_processes()?;
         let mut ticks = 0;
@@ -28,7 +30,8 @@ impl Chromium {
     }
 }
 
-/// Time of the fixed loop, the least of several: what else runs on the machine interrupts some of them, never all.
+/// Time of the fixed loop, the least of several: what else runs on the machine interrupts some of
+/// them, never all.
 pub fn loop_time() -> Duration {
     let timed = || {
         let begin = Instant::now();
@@ -56,7 +59,8 @@ fn all_processes() -> Result<HashMap<u32, Process>, Error> {
         .collect())
 }
 
-/// Parent and times of a line of `/proc/*/stat`: the fields 4, 14 and 15 of proc(5), counted after the name in brackets.
+/// Parent and times of a line of `/proc/*/stat`: the fields 4, 14 and 15 of proc(5), counted after
+/// the name in brackets.
 fn process(stat: &str) -> Option<Process> {
     let (_, rest) = stat.rsplit_once(')')?;
     let fields: Vec<&str> = rest.split_whitespace().collect();

@@ -10,7 +10,8 @@ use std::time::{Duration, Instant};
 /// A start on a busy machine.
 const START: Duration = Duration::from_secs(60);
 
-/// The locations of programs and pages, relative to the test itself: `target/release/deps/browser-…`.
+/// The locations of programs and pages, relative to the test itself:
+/// `target/release/deps/browser-…`.
 pub struct Places {
     /// The target directory.
     pub target: PathBuf,

@@ -20,7 +20,8 @@ pub enum Port {
 pub struct Counts {
     /// The number of times that the serial port appeared.
     pub enumerations: u32,
-    /// The number of times that it disappeared without the cable being pulled: the device restarted.
+    /// The number of times that it disappeared without the cable being pulled: the device
+    /// restarted.
     pub disconnects: u32,
     /// Transactions that the device did not answer after it was configured.
     pub silences: u64,

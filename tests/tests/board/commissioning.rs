@@ -1,5 +1,6 @@
-//! A board that nobody has commissioned gives no torque but two millinewton metres, and says why; one that has been switched
-//! on does not start before it knows its depth. `host-sim commission` on the flash image; no command does it instead.
+//! A board that nobody has commissioned gives no torque but two millinewton metres, and says why;
+//! one that has been switched on does not start before it knows its depth. `host-sim commission` on
+//! the flash image; no command does it instead.
 
 use std::f64::consts::TAU;
 use std::time::Duration;
@@ -119,7 +120,8 @@ fn a_zero_outlives_a_cable_that_is_pulled() {
     assert_eq!(pc.command(&mut board, Command::Start).result, Ok(()));
 }
 
-/// The board was built for so much, whatever a record says; and what has been commissioned is lowered, not raised.
+/// The board was built for so much, whatever a record says; and what has been commissioned is
+/// lowered, not raised.
 #[test]
 fn no_command_raises_a_ceiling() {
     let mut board = board(plant::held());
@@ -164,7 +166,8 @@ fn no_command_raises_a_ceiling() {
     assert_eq!(hash, Some(link::codec::hash(&weak)));
 }
 
-/// `host-sim commission` at the end of the emulated cable, with a hand that does what a person is asked.
+/// `host-sim commission` at the end of the emulated cable, with a hand that does what a person is
+/// asked.
 struct Bench {
     board: Board,
     needle: Needle,

@@ -10,13 +10,15 @@ use tests::rig::{Rig, task};
 const BEYOND: u32 = 0x2002_0100;
 /// Nothing answers there: reserved, past the part's RAM (RM0090 2.3).
 const NOWHERE: u32 = 0x2010_0000;
-/// `PRECISERR` and `BFARVALID` of the fault status, `IBUSERR` (ARMv7-M B3.2.15), and `FORCED` of the hard fault's (B3.2.16).
+/// `PRECISERR` and `BFARVALID` of the fault status, `IBUSERR` (ARMv7-M B3.2.15), and `FORCED` of
+/// the hard fault's (B3.2.16).
 const PRECISE: u32 = 1 << 9;
 const ADDRESS_VALID: u32 = 1 << 15;
 const INSTRUCTION_BUS: u32 = 1 << 8;
 const FORCED: u32 = 1 << 30;
 
-/// Crashes in `exception` by `effect`, under torque, and returns what the next PC to say hello receives.
+/// Crashes in `exception` by `effect`, under torque, and returns what the next PC to say hello
+/// receives.
 fn record_of(rig: &mut Rig, exception: u32, effect: Effect) -> Crash {
     rig.upset(exception, effect);
     rig.time_to_safe(6 * MILLISECOND);

@@ -1,4 +1,5 @@
-//! Tests of what a PC may have a device play by itself: within its bounds, in a session, and no longer.
+//! Tests of what a PC may have a device play by itself: within its bounds, in a session, and no
+//! longer.
 
 use control_core::event::State;
 use control_core::excitation::{Excitation, SequenceRefusal, Servo, Signal};
@@ -100,7 +101,8 @@ fn a_sequence_stays_in_bounds_and_ends_with_its_session() {
     assert!(!board.at_stop(|stopped| stopped.drive().enabled), "a new session starts no torque");
 }
 
-/// A quarter of a second each: strokes, ramps of torque while the reference rests where they ended, and strokes from there.
+/// A quarter of a second each: strokes, ramps of torque while the reference rests where they ended,
+/// and strokes from there.
 fn three_segments() -> Vec<Excitation> {
     let ramps = Signal::BreakawayRamps { torque: MillinewtonMetres(I16F16::from_num(2)), ramp_ms: 100 };
     vec![strokes(50.0, 250), Excitation { signal: ramps, ..strokes(50.0, 250) }, strokes(30.0, 250)]

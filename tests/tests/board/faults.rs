@@ -71,7 +71,8 @@ fn an_accelerometer_that_is_stuck() {
     tilt_fault(Model::Lis3dsh, Health::Frozen, 600 * MILLISECOND);
 }
 
-/// It answers as before, and is in power-down: it has to be told again what it is to do, and the device goes on.
+/// It answers as before, and is in power-down: it needs its configuration again, and the device
+/// goes on.
 #[test]
 fn an_accelerometer_that_loses_its_power_alone_is_set_up_again() {
     for model in [Model::Lis302dl, Model::Lis3dsh] {

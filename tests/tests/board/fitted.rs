@@ -1,5 +1,5 @@
-//! Alternative parts: the 8-bit converter that a configuration names, the analogue inclinometer that a strap names.
-//! The image is the same one.
+//! Alternative parts: the 8-bit converter that a configuration names, the analogue inclinometer
+//! that a strap names. The image is the same one.
 
 use control_core::Config;
 use control_core::config::DacWidth;

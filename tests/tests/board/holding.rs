@@ -1,5 +1,5 @@
-//! A hand that holds still: the device goes on holding against it for minutes, and an encoder that dies meanwhile is found all the
-//! same. Paper 002 asks for exactly that hold.
+//! A hand that holds still: the device goes on holding against it for minutes, and an encoder that
+//! dies meanwhile is found all the same. Paper 002 asks for exactly that hold.
 
 use control_core::event::Fault;
 use control_core::units::{Counts, Milliradians};
@@ -34,8 +34,9 @@ fn upright() -> Device {
     device
 }
 
-/// A hand with this stiffness in N/m that presses a needle of 30 g on bearings of 0.06 N until the motor gives 0.41 N, and then
-/// holds where it is: perfectly still, or with a tremor of this amplitude in m at 9 Hz.
+/// A hand with this stiffness in N/m that presses a needle of 30 g on bearings of 0.06 N until the
+/// motor gives 0.41 N, and then holds where it is: perfectly still, or with a tremor of this
+/// amplitude in m at 9 Hz.
 struct Held {
     controller: Controller,
     stiffness: f64,
@@ -138,7 +139,8 @@ fn a_hand_that_holds_still_for_minutes_keeps_its_device() {
     }
 }
 
-/// A needle on the board that a hand presses until the motor gives 0.41 N and then holds perfectly still.
+/// A needle on the board that a hand presses until the motor gives 0.41 N and then holds perfectly
+/// still.
 fn held_on_the_board(patient: Patient) -> (Rig, Needle) {
     let needle = Needle::held_at(0.0);
     let mut rig = Rig { board: board_wired(Wiring::default(), needle.plant(0)), pc: Pc::counting() };
@@ -178,7 +180,8 @@ fn on_the_board_a_hand_that_holds_still_keeps_its_device() {
         }
         let newtons = |codes: u16| f64::from(codes) / 2_047.0 * 2.88;
         println!("| {name}, held for 20 s | {:.2} to {:.2} N |", newtons(codes.0), newtons(codes.1));
-        // The tissue has relaxed below an eighth of the limit, the smallest torque that is looked at.
+        // The tissue has relaxed below an eighth of the limit, the smallest torque that is looked
+        // at.
         press_until(&mut rig, &needle, HELD_CODES);
         rig.board.at_stop(|stopped| stopped.set_wires(Wires { supply_off: true, ..Wires::default() }));
         let time = rig.time_to_safe(200 * MILLISECOND);

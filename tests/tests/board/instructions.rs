@@ -25,7 +25,8 @@ use tests::scenario::{COUNTS_PER_MM, board, venepuncture};
 
 /// The tick's interrupt handler.
 const TICK: &str = "TIM4";
-/// The limit for a tick of the default patient without compensation: five per cent of its cycles. The converter is latched after 3,360.
+/// The limit for a tick of the default patient without compensation: five per cent of its cycles.
+/// The converter is latched after 3,360.
 const LONGEST: u32 = 840;
 const LATCH_CYCLES: u32 = 3_360;
 /// The same of six walls that are all met, and of excitations.
@@ -47,8 +48,8 @@ struct Profile {
 }
 
 impl Profile {
-    /// Adds the ticks until `end` of a board with `config`, started by `begin`, whose needle the plant moves. `meddle` is
-    /// called every millisecond.
+    /// Adds the ticks until `end` of a board with `config`, started by `begin`, whose needle the
+    /// plant moves. `meddle` is called every millisecond.
     fn add(
         &mut self,
         config: Config,
@@ -71,7 +72,8 @@ impl Profile {
         }
         let ticks = board.counted_runs();
         pc.run_ms(&mut board, 50);
-        // The last tick of the profile and the last sample are a few apart; the state changes slowly.
+        // The last tick of the profile and the last sample are a few apart; the state changes
+        // slowly.
         let first = pc.heard.samples.len().checked_sub(500 + ticks.len()).expect("a sample for each tick");
         for (run, (_, sample)) in ticks.iter().zip(&pc.heard.samples[first..]) {
             self.by_state.entry(sample.state).or_default().push(run.instructions);
@@ -107,8 +109,9 @@ fn q(value: f64) -> I16F16 {
     I16F16::from_num(value)
 }
 
-/// As many walls as there may be, `apart` from one another and twice that along a needle at 30°, each of which gives way after five sixths of that and is felt
-/// for long after, along its relief parabola.
+/// As many walls as there may be, `apart` from one another and twice that along a needle at 30°,
+/// each of which gives way after five sixths of that and is felt for long after, along its relief
+/// parabola.
 fn walls(apart: f64) -> Vec<Layer> {
     let parabola = |vertex: f64, compliance: f64, base: f64| Parabola {
         vertex: Millimetres(q(vertex)),
@@ -132,8 +135,9 @@ fn walls(apart: f64) -> Vec<Layer> {
     (0..MAX_LAYERS).map(layer).collect()
 }
 
-/// Every switch both ways: the law of friction, how speed is estimated, the converter. Everything that a value turns on is
-/// on: as many walls as there may be, damping, the passivity observer, a thermal limit that is in force.
+/// Every switch both ways: the law of friction, how speed is estimated, the converter. Everything
+/// that a value turns on is on: as many walls as there may be, damping, the passivity observer, a
+/// thermal limit that is in force.
 fn heaviest(apart: f64) -> impl Iterator<Item = Config> {
     let paper = FrictionLaw::Paper {
         level_length: Millimetres(q(23.0)),
@@ -207,9 +211,9 @@ fn a_tick_takes_at_most_840_instructions() {
     assert!(2 * used <= size, "more than half of the stack was used: {used} of {size} bytes");
 }
 
-/// RM0090 3.5.2: the tick's code is more than the flash's cache holds, and other tasks have used the cache since the tick before. With every
-/// line of code from the flash, without prefetch, and one and a half cycles for an instruction, the code is written before the
-/// converter takes it.
+/// RM0090 3.5.2: the tick's code is more than the flash's cache holds, and other tasks have used
+/// the cache since the tick before. With every line of code from the flash, without prefetch, and
+/// one and a half cycles for an instruction, the code is written before the converter takes it.
 #[test]
 fn a_tick_whose_code_is_not_cached_is_done_before_the_latch() {
     for (name, compensation) in [("default", Compensation::NONE), ("all fed forward", all_fed_forward())] {
@@ -257,7 +261,8 @@ fn a_tick_with_all_feedforward_takes_at_most_1260_instructions() {
     assert!(2 * used <= size, "more than half of the stack was used: {used} of {size} bytes");
 }
 
-/// In and out at 100 mm/s and more, with pauses; stopped and started again all the while the needle comes out.
+/// In and out at 100 mm/s and more, with pauses; stopped and started again all the while the needle
+/// comes out.
 #[test]
 fn a_tick_of_the_heaviest_configurations_takes_no_more() {
     let mm = |depth: i64| depth * COUNTS_PER_MM;
@@ -291,7 +296,8 @@ fn a_tick_of_the_heaviest_configurations_takes_no_more() {
     assert!(longest <= HEAVIEST, "a tick of {longest} instructions");
 }
 
-/// In through all layers, with a rest on the way, and out, in as many layers as there may be and in fewer.
+/// In through all layers, with a rest on the way, and out, in as many layers as there may be and in
+/// fewer.
 #[test]
 fn a_tick_of_the_other_laws_takes_at_most_1260_instructions() {
     type Make = fn(usize) -> Config;
@@ -369,8 +375,8 @@ fn nor_does_a_tick_that_plays_an_excitation() {
     assert!(longest <= EXCITING, "a tick of {longest} instructions");
 }
 
-/// One of every signal, and one of multisines alone, which take longest, in segments as short as they may be: the ticks in which one segment
-/// gives way to the next are among them.
+/// One of every signal, and one of multisines alone, which take longest, in segments as short as
+/// they may be: the ticks in which one segment gives way to the next are among them.
 #[test]
 fn nor_does_a_tick_that_plays_a_sequence() {
     let mut every: Vec<Excitation> = every_signal().map(|signal| played(signal, 60)).into();

@@ -1,4 +1,5 @@
-//! The properties of the flash image, on the emulated boards. One program, because each further one would generate the emulator's code again.
+//! The properties of the flash image, on the emulated boards. One program, because each further one
+//! would generate the emulator's code again.
 
 mod commissioning;
 mod compensation;

@@ -21,7 +21,8 @@ fn garbage(seed: &mut u64) -> Vec<u8> {
         .collect()
 }
 
-/// Sends valid commands and garbage in turn until `end`, faster than the cable carries them; returns the number of commands.
+/// Sends valid commands and garbage in turn until `end`, faster than the cable carries them;
+/// returns the number of commands.
 fn flood(pc: &mut Pc, board: &mut Board, end: Nanos) -> u64 {
     let mut seed = 1;
     let mut commands = 0_u64;

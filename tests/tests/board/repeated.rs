@@ -9,7 +9,8 @@ use std::path::Path;
 use tests::board::{Board, EncoderRead, Output, Wiring, firmware_path, plant};
 use tests::pc::Pc;
 
-/// The record of the pins over a start, a cable plugged in and half a second of ramps; and the least and most instructions of a tick.
+/// The record of the pins over a start, a cable plugged in and half a second of ramps; and the
+/// least and most instructions of a tick.
 fn pins_saw(image: &Path) -> (Vec<Output>, Vec<EncoderRead>, Option<u32>, Option<u32>) {
     let mut board = Board::on(image, Wiring::default(), plant::held()).expect("the image runs");
     let mut pc = Pc::new();

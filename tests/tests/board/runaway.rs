@@ -1,5 +1,5 @@
-//! It cannot run away: what is wired wrongly, breaks or is pressed takes the amplifier off before a hand is hurt. Each on
-//! the flash image with a plant that does it.
+//! It cannot run away: what is wired wrongly, breaks or is pressed takes the amplifier off before a
+//! hand is hurt. Each on the flash image with a plant that does it.
 
 use control_core::event::Fault;
 use control_core::interlock::Interlock;
@@ -144,7 +144,8 @@ fn an_encoder_unplugged_while_friction_is_rendered() {
     tripped(&mut rig, Fault::EncoderWire);
 }
 
-/// Its outputs are held at one level and do not float, so that no pull tells. A needle that is let go runs free meanwhile.
+/// Its outputs are held at one level and do not float, so that no pull tells. A needle that is let
+/// go runs free meanwhile.
 #[test]
 fn an_encoder_that_loses_its_power() {
     let supply_off = Wires { supply_off: true, ..Wires::default() };
@@ -220,7 +221,7 @@ fn a_stop_whose_wire_is_shorted_to_ground() {
     tripped(&mut rig, Fault::EmergencyStop);
 }
 
-/// The enable line is high whatever the device does: the converter at zero torque is what is left.
+/// The enable line is high whatever the device does: only the converter at zero torque remains.
 #[test]
 fn an_enable_line_that_is_stuck_on() {
     let (mut rig, needle) = pressed();

@@ -1,5 +1,5 @@
-//! The image for the NUCLEO-F429ZI on its own pins: it is the same device, it takes torque away there, and no image runs on the other's
-//! board.
+//! The image for the NUCLEO-F429ZI on its own pins: it is the same device, it takes torque away
+//! there, and no image runs on the other's board.
 
 use control_core::Config;
 use control_core::event::{Fault, State};
@@ -141,7 +141,8 @@ fn a_configuration_outlives_a_reset() {
     assert_eq!(hello.config_hash, link::codec::hash(&config));
 }
 
-/// An image for `of` on a board wired as `on`, where it gets as far as the cable: on its own board it does in 10 ms.
+/// An image for `of` on a board wired as `on`, where it gets as far as the cable: on its own board
+/// it does in 10 ms.
 fn comes_up(of: &Pins, on: Pins) -> Option<Rig> {
     let wiring = Wiring { pins: on, ..Wiring::nucleo_f429zi() };
     let board = Board::on(&image_for(of), wiring, plant::held()).unwrap_or_else(|why| panic!("{why}"));
@@ -151,7 +152,8 @@ fn comes_up(of: &Pins, on: Pins) -> Option<Rig> {
     is_there.then_some(rig)
 }
 
-/// The clock is the first difference, the pins the next: so both images really are for their own board.
+/// The clock is the first difference, the pins the next: so both images really are for their own
+/// board.
 #[test]
 fn no_image_runs_on_the_other_board() {
     assert!(comes_up(&NUCLEO_F429ZI, NUCLEO_F429ZI).is_some());

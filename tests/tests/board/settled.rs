@@ -1,6 +1,7 @@
-//! `settle` on the flash image: the emulated board plays the excitations on a mechanism that the diagnosis did not write
-//! (`tests::mechanism`: a law and an integrator of its own), or on a plant that another author concealed
-//! (`tests/independent/settle_plants.py`), and the diagnosis names what is concealed in it.
+//! `settle` on the flash image: the emulated board plays the excitations on a mechanism that the
+//! diagnosis did not write (`tests::mechanism`: a law and an integrator of its own), or on a plant
+//! that another author concealed (`tests/independent/settle_plants.py`), and the diagnosis names
+//! what is concealed in it.
 
 use std::io;
 use std::path::Path;
@@ -24,10 +25,12 @@ const TILT: f64 = std::f64::consts::FRAC_PI_6;
 /// The DAC code without torque, and the longest step of a plant, s.
 const MID_SCALE: f64 = 2_048.0;
 const STEP_S: f64 = 2e-5;
-/// The most that the board moves on between two readings, so that a slow computer makes a slow device and not a silent one.
+/// The most that the board moves on between two readings, so that a slow computer makes a slow
+/// device and not a silent one.
 const BURST_MS: u64 = 5;
 
-/// The board at the end of its cable. It moves on only while the cable is read, and no faster than a clock.
+/// The board at the end of its cable. It moves on only while the cable is read, and no faster than
+/// a clock.
 struct Plugged(Arc<Mutex<Board>>);
 
 struct Cable {

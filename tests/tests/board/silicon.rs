@@ -1,4 +1,5 @@
-//! Requirements of the part and the board that an emulator easily forgives: each test failed on the previous image.
+//! Requirements of the part and the board that an emulator easily forgives: each test failed on the
+//! previous image.
 
 use control_core::Config;
 use control_core::excitation::{Excitation, Servo, Signal};
@@ -26,7 +27,8 @@ fn is_allowed(board: &mut Board) {
     assert!(violations.is_empty(), "{violations:?}");
 }
 
-/// RM0090 14.3.6 (the trigger is chosen before the converter is enabled) and 14.3.2 (its buffer ends before the rails do).
+/// RM0090 14.3.6 (the trigger is chosen before the converter is enabled) and 14.3.2 (its buffer
+/// ends before the rails do).
 #[test]
 fn full_torque_both_ways_reaches_the_pin() {
     let mut rig = connected(Wiring::default());
@@ -50,7 +52,8 @@ fn full_torque_both_ways_reaches_the_pin() {
     is_allowed(&mut rig.board);
 }
 
-/// RM0090 3.9.7: a control register that is written whole locks itself; 3.6: an erasure stops the processor.
+/// RM0090 3.9.7: a control register that is written whole locks itself; 3.6: an erasure stops the
+/// processor.
 #[test]
 fn three_hundred_configurations_are_all_saved() {
     let mut rig = connected(Wiring::default());
@@ -80,7 +83,8 @@ fn three_hundred_configurations_are_all_saved() {
     is_allowed(&mut rig.board);
 }
 
-/// A start that a stop overtakes, and a configuration for which there is no room: the processor may not stop with torque on.
+/// A start that a stop overtakes, and a configuration for which there is no room: the processor may
+/// not stop with torque on.
 #[test]
 fn a_sector_is_erased_with_the_amplifier_off_only() {
     let mut rig = connected(Wiring::default());
@@ -132,7 +136,8 @@ fn a_supply_that_is_low_from_the_start_is_seen() {
     rig.pc.must(&mut rig.board, Command::Start);
 }
 
-/// RM0090 3.6.2: 32 bits at a time ask for 2.7 V. DS8626: the detector may not see a supply before 2.59 V.
+/// RM0090 3.6.2: 32 bits at a time ask for 2.7 V. DS8626: the detector may not see a supply before
+/// 2.59 V.
 #[test]
 fn a_configuration_is_saved_on_a_low_supply() {
     let mut rig = connected(Wiring { supply: 2_650, ..Wiring::default() });
@@ -144,8 +149,9 @@ fn a_configuration_is_saved_on_a_low_supply() {
     is_allowed(&mut rig.board);
 }
 
-/// RM0090 3.5.1: 168 MHz take 5 wait states from 2.7 V on and 6 below. ST's start-up code prefetches from revision 0x1001 on; the
-/// first revision reads as its number in the manual or, by the errata sheet, as an STM32F2.
+/// RM0090 3.5.1: 168 MHz take 5 wait states from 2.7 V on and 6 below. ST's start-up code
+/// prefetches from revision 0x1001 on; the first revision reads as its number in the manual or, by
+/// the errata sheet, as an STM32F2.
 #[test]
 fn the_flash_has_time_on_the_lowest_supply() {
     const FLASH_ACR: u64 = 0x4002_3C00;
@@ -217,8 +223,9 @@ fn a_glitch_of_the_motors_leads_is_no_count() {
     assert!(rig.board.at_stop(|stopped| stopped.drive().enabled), "no fault");
 }
 
-/// PRIMASK keeps the tick away, which no priority does: the driver of the USB core sets it while it looks at the core. What
-/// it keeps it away for, the tick's way to the converter and the latch have to agree.
+/// PRIMASK keeps the tick away, which no priority does: the driver of the USB core sets it while it
+/// looks at the core. What it keeps it away for, the tick's way to the converter and the latch have
+/// to agree.
 #[test]
 fn nothing_masks_the_tick_for_longer_than_the_latch_waits() {
     /// Instructions, at one a cycle, from the tick's edge to the latch.

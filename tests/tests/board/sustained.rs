@@ -1,5 +1,5 @@
-//! The protections against sustained overload, on the board: the heat of the winding and the energy of a stiff wall.
-//! Either takes torque back and says so as a limit in force; neither is a fault.
+//! The protections against sustained overload, on the board: the heat of the winding and the energy
+//! of a stiff wall. Either takes torque back and says so as a limit in force; neither is a fault.
 
 use std::sync::{Arc, Mutex};
 
@@ -97,7 +97,8 @@ fn hold_strong(continuous_mnm: f64) -> (Vec<f64>, bool) {
     (torques, first_told(&pc, Limits::THERMAL).is_some())
 }
 
-/// The winding by itself, in floating point: the root of the largest mean square over its time constant of 2 s.
+/// The winding by itself, in floating point: the root of the largest mean square over its time
+/// constant of 2 s.
 fn hottest(torques: &[f64]) -> f64 {
     let (mut heat, mut hottest) = (0.0, 0.0_f64);
     for torque in torques {
@@ -125,7 +126,8 @@ fn torque_falls_before_the_continuous_limit_is_exceeded() {
     assert!(hottest(&torques) > 1.3 * CONTINUOUS_MNM && !told, "without the limit it gets too hot");
 }
 
-/// 30 g of needle and roller under a light hand, which leans on the wall over a second with 0.4 N and is knocked once.
+/// 30 g of needle and roller under a light hand, which leans on the wall over a second with 0.4 N
+/// and is knocked once.
 struct Needle {
     at: Nanos,
     leans_from: Nanos,
@@ -167,7 +169,8 @@ impl Needle {
 
 /// A wall under a hand that leans on it.
 struct Ringing {
-    /// Deviation of the needle at the end, in µm: in the last half second, or in 50 ms before a fault.
+    /// Deviation of the needle at the end, in µm: in the last half second, or in 50 ms before a
+    /// fault.
     deviation: f64,
     /// The time at which the observer was reported to be active.
     told: Option<u64>,
@@ -208,7 +211,8 @@ fn a_stiff_wall_rings_without_the_observer_and_is_quiet_with_it() {
     unobserved.device.passivity_damping = Damping::default();
     let loud = ringing(unobserved);
     println!("| ringing wall | {:.1} µm, with the observer {:.1} µm |", loud.deviation, quiet.deviation);
-    // What rings like this may be taken for a motor that drives the wrong way; for a dead channel it may not.
+    // What rings like this may be taken for a motor that drives the wrong way; for a dead channel
+    // it may not.
     assert!(matches!(loud.fault, None | Some(Fault::WrongWay)), "{:?}", loud.fault);
     assert!(loud.deviation > 50.0, "it should ring without the observer: {} µm", loud.deviation);
     assert_eq!(quiet.fault, None, "a limit in force is no fault");

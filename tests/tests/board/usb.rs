@@ -17,7 +17,8 @@ fn a_pc_finds_a_serial_port_with_the_devices_name() {
         let port = stopped.usb();
         (port.host.identity().clone(), port.core.misuse(), stopped.stray_accesses())
     });
-    // pid.codes' test identity; V-USB's 16C0:27DD asks for a domain at the beginning of the serial number.
+    // pid.codes' test identity; V-USB's 16C0:27DD asks for a domain at the beginning of the serial
+    // number.
     assert_eq!((identity.vendor, identity.product), (0x1209, 0x0001));
     assert!(identity.strings.iter().all(Option::is_some), "{identity:?}");
     assert_eq!(misuse, (0, 0), "packet memory");

@@ -1,4 +1,5 @@
-//! The tables of pins in docs/hardware.md, from which the wiring diagrams are drawn, name the pins that the emulated boards drive.
+//! The tables of pins in docs/hardware.md, from which the wiring diagrams are drawn, name the pins
+//! that the emulated boards drive.
 
 use tests::board::pins::{DISCOVERY, NUCLEO_F429ZI, PartPin, Pins};
 

@@ -1,5 +1,5 @@
-//! Stop is never covered, keys stop the torque, and axe-core finds nothing to complain about: at every size, in every state of the
-//! page, light and dark.
+//! Stop is never covered, keys stop the torque, and axe-core finds nothing to complain about: at
+//! every size, in every state of the page, light and dark.
 
 use crate::needle::{SIZES, SOON, Size, complaints, open, pictures, resize};
 use serde_json::json;
@@ -169,8 +169,8 @@ fn axe_finds_nothing(page: &mut Page, state: &str) -> Result<(), Error> {
     check(&format!("accessible: {state}"), found == json!([]), &found)
 }
 
-/// The weakest contrast of words on the section, which axe-core cannot see: names on their ground of 85 % panel over each tissue, and
-/// the force on its edge.
+/// The weakest contrast of words on the section, which axe-core cannot see: names on their ground
+/// of 85 % panel over each tissue, and the force on its edge.
 const WEAKEST_CONTRAST: &str = "(() => {
     const style = getComputedStyle(document.documentElement);
     const rgb = name => { const n = parseInt(style.getPropertyValue('--' + name).trim().slice(1, 7), 16); return [n >> 16, (n >> 8) & 255, n & 255]; };

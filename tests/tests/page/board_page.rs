@@ -1,5 +1,5 @@
-//! The page of a real board in a real browser. Its serial port and its USB are mocked and lead here: to the virtual device, and to a bootloader
-//! with the rules of AN3156.
+//! The page of a real board in a real browser. Its serial port and its USB are mocked and lead
+//! here: to the virtual device, and to a bootloader with the rules of AN3156.
 
 use crate::board_session::{ACTS, uncommissioned};
 use crate::update::{carry_out, dfuse, image};
@@ -16,7 +16,8 @@ use tests::bootloader::{Bootloader, FLASH, MEMORY};
 use tests::browser::{Chromium, Error, Page, Places, check};
 
 const SOME_TIME: Duration = Duration::from_secs(60);
-/// The most that the device's time goes on between two exchanges with the page: it is never ahead of the page's clock, whose heartbeat it awaits.
+/// The most that the device's time goes on between two exchanges with the page: it is never ahead
+/// of the page's clock, whose heartbeat it awaits.
 const AT_ONCE: Duration = Duration::from_millis(40);
 const MOCK: &str = include_str!("board_page.js");
 
@@ -214,7 +215,8 @@ fn update() -> Result<(), Error> {
             Some("out") => Next::Out { request, value, data: bytes(&asked["data"]) },
             Some(_) => Next::In { request, value, length: number("length") as u16 },
             None if bench.page.evaluate("document.getElementById('banner').hidden")? == json!(true) => {
-                // The page waits by itself, for as long as the bootloader said: 0.5 s for an erasure.
+                // The page waits by itself, for as long as the bootloader said: 0.5 s for an
+                // erasure.
                 answer = json!(null);
                 continue;
             }

@@ -1,4 +1,5 @@
-//! The bytes that the page of a real board sends, and when: nothing that gives torque but after a press in the guide of this very connection.
+//! The bytes that the page of a real board sends, and when: nothing that gives torque but after a
+//! press in the guide of this very connection.
 
 use board_wasm::session::Session;
 use board_wasm::work::Task;

@@ -1,5 +1,6 @@
-//! A body in three dimensions in the page: the site, the point of entry, the direction and the limb's turn are chosen there, the device gets
-//! the layers of that line, and the probe is dragged over the skin.
+//! A body in three dimensions in the page: the site, the point of entry, the direction and the
+//! limb's turn are chosen there, the device gets the layers of that line, and the probe is dragged
+//! over the skin.
 
 use serde_json::Value;
 use std::time::Duration;
@@ -61,7 +62,8 @@ fn slide(page: &mut Page, id: &str, value: i32) -> Result<Value, Error> {
     ))
 }
 
-/// A person's needle is drawn out, enters over the shoulder's vein, which it then meets, and the skin of the picture slopes as the limb turns.
+/// A person's needle is drawn out, enters over the shoulder's vein, which it then meets, and the
+/// skin of the picture slopes as the limb turns.
 fn entry_and_turn(page: &mut Page) -> Result<(), Error> {
     slide(page, "needle-depth", 6)?;
     page.wait("a person's needle inside", SOON, "__stats.depthMm > 2")?;

@@ -1,7 +1,9 @@
-//! The page in a real browser: the main job as a person meets it, from the address that the program prints to the stop.
+//! The page in a real browser: the main job as a person meets it, from the address that the program
+//! prints to the stop.
 //!
-//! One browser and one program, one step after the other, and no other test beside it (`.config/nextest.toml`): two cores are not
-//! enough for several at once to keep 60 pictures a second. Writes what it measured to `target/page.json`.
+//! One browser and one program, one step after the other, and no other test beside it
+//! (`.config/nextest.toml`): two cores are not enough for several at once to keep 60 pictures a
+//! second. Writes what it measured to `target/page.json`.
 
 use control_core::config::Config;
 use control_core::controller::{Controller, Order, TickInput};
@@ -19,11 +21,13 @@ const SOON: Duration = Duration::from_secs(10);
 const A_FEW_INSERTIONS: Duration = Duration::from_secs(40);
 /// Pictures a second that the page has to reach, on a machine that can.
 const FEWEST_FPS: f64 = 50.0;
-/// Seconds in which it may reach them: a headless browser draws without a graphics processor, and what else runs shares its
-/// processor. A page that is too slow in itself does not reach them in any.
+/// Seconds in which it may reach them: a headless browser draws without a graphics processor, and
+/// what else runs shares its processor. A page that is too slow in itself does not reach them in
+/// any.
 const FPS_WINDOWS: usize = 20;
-/// Processor time of one picture over that of [`loop_time`], at most, on a machine that reaches fewer. Measured: 1.58 with 54
-/// pictures a second, 1.63 with 17, beside four programs that do nothing but count.
+/// Processor time of one picture over that of [`loop_time`], at most, on a machine that reaches
+/// fewer. Measured: 1.58 with 54 pictures a second, 1.63 with 17, beside four programs that do
+/// nothing but count.
 const MOST_LOOPS_A_PICTURE: f64 = 2.5;
 /// Steps of the hand that are timed: enough for a median.
 const LATENCY_STEPS: usize = 30;
@@ -78,7 +82,8 @@ fn visit() -> Result<(), Error> {
     Ok(())
 }
 
-/// The needle moves, both punctures are listed, the plots change, and all of it at the rate of the screen.
+/// The needle moves, both punctures are listed, the plots change, and all of it at the rate of the
+/// screen.
 fn watch(page: &mut Page, browser: &Chromium) -> Result<Vec<Value>, Error> {
     page.wait("live data", SOON, "document.body.dataset.link === 'live' && !isNaN(__stats.firstFrameMs)")?;
     let first_frame_s = page.number("__stats.firstFrameMs")? / 1000.0;
@@ -135,7 +140,8 @@ struct PictureRate {
     loops_per_picture: f64,
 }
 
-/// The rate of the screen; where a slow machine does not reach it, a picture may not take more of the processor than on others.
+/// The rate of the screen; where a slow machine does not reach it, a picture may not take more of
+/// the processor than on others.
 fn picture_rate(page: &mut Page, browser: &Chromium) -> Result<PictureRate, Error> {
     let loop_s = loop_time().as_secs_f64();
     let mut rates = Vec::new();
@@ -165,7 +171,8 @@ fn photographs(page: &mut Page, scratch: &Path) -> Result<(), Error> {
     page.dark(false)
 }
 
-/// A person takes the needle with the mouse and presses the skin: the force answers as the control core computes it.
+/// A person takes the needle with the mouse and presses the skin: the force answers as the control
+/// core computes it.
 fn drag(page: &mut Page) -> Result<(), Error> {
     page.wait("the needle outside", A_FEW_INSERTIONS, "__stats.depthMm < -3")?;
     let mut at = page.middle("section")?;
@@ -206,8 +213,8 @@ fn push_until(page: &mut Page, at: &mut (f64, f64), depth_mm: f64) -> Result<(),
     Err(format!("the needle did not follow the mouse to {depth_mm} mm"))
 }
 
-/// The force that the control core gives with the tip at rest at `depth_mm` in whole skin: the least on the way out, the
-/// greatest on the way in; friction makes the difference.
+/// The force that the control core gives with the tip at rest at `depth_mm` in whole skin: the
+/// least on the way out, the greatest on the way in; friction makes the difference.
 fn force_of_the_core(depth_mm: f64) -> Result<(f64, f64), Error> {
     let config = Config::commissioned_virtual();
     let device = config.device;
@@ -235,8 +242,9 @@ fn force_of_the_core(depth_mm: f64) -> Result<(f64, f64), Error> {
     Ok((force(target).min(way_in), way_in))
 }
 
-/// Time from the event of the mouse in the page to the first picture in which the force has answered, by a tenth of the
-/// step or more. The way there and back: page, WebSocket, session, link, control core and plant, and back.
+/// Time from the event of the mouse in the page to the first picture in which the force has
+/// answered, by a tenth of the step or more. The way there and back: page, WebSocket, session,
+/// link, control core and plant, and back.
 fn latency(page: &mut Page) -> Result<Vec<Value>, Error> {
     page.evaluate(
         "(() => { \
@@ -252,7 +260,8 @@ fn latency(page: &mut Page) -> Result<Vec<Value>, Error> {
     )?;
     let mut near = page.middle("section")?;
     page.mouse("mousePressed", near)?;
-    // Back to where the skin is hardly pressed, then steps of 2 mm to and fro: the skin gives way at 3 mm.
+    // Back to where the skin is hardly pressed, then steps of 2 mm to and fro: the skin gives way
+    // at 3 mm.
     for _ in 0..200 {
         if page.number("__stats.depthMm")? <= 0.5 {
             break;
@@ -285,7 +294,8 @@ fn latency(page: &mut Page) -> Result<Vec<Value>, Error> {
     Ok(rows)
 }
 
-/// The stop takes the torque off, by button and by keys; Start brings it back; Demo gives the needle back.
+/// The stop takes the torque off, by button and by keys; Start brings it back; Demo gives the
+/// needle back.
 fn stop(page: &mut Page) -> Result<(), Error> {
     let stopped =
         "document.getElementById('state').textContent === 'Stopped, torque off' && __stats.motorN === 0";
@@ -325,7 +335,8 @@ fn stop(page: &mut Page) -> Result<(), Error> {
     page.click("demo")
 }
 
-/// The zero waits for torque off and then makes the tip's place depth 0; the slider turns the simulated needle.
+/// The zero waits for torque off and then makes the tip's place depth 0; the slider turns the
+/// simulated needle.
 fn zero_and_turn(page: &mut Page) -> Result<(), Error> {
     let locked = "document.getElementById('zero').disabled";
     page.wait("no zero while torque is on", SOON, locked)?;
@@ -343,7 +354,8 @@ fn zero_and_turn(page: &mut Page) -> Result<(), Error> {
     page.wait("both walls from the new zero", A_FEW_INSERTIONS, "__stats.depthMm > 6")
 }
 
-/// The needle turns; steeper, the same way along the needle goes through the far wall, and is told as that.
+/// The needle turns; steeper, the same way along the needle goes through the far wall, and is
+/// reported as that.
 fn turn_and_go_through(page: &mut Page, scratch: &Path) -> Result<(), Error> {
     let turn = |degrees: u32| {
         format!(
@@ -362,7 +374,7 @@ fn turn_and_go_through(page: &mut Page, scratch: &Path) -> Result<(), Error> {
     page.wait("a needle through the far wall", A_FEW_INSERTIONS, "__stats.vessel === 'through'")?;
     page.photograph(&scratch.join("through.png"))?;
     page.wait(
-        "a through-puncture told as one",
+        "a through-puncture reported as one",
         SOON,
         "document.querySelector('#events [data-kind=far_wall]')?.textContent.includes('far wall')",
     )?;
@@ -370,7 +382,8 @@ fn turn_and_go_through(page: &mut Page, scratch: &Path) -> Result<(), Error> {
     page.wait("the needle outside at 30°", A_FEW_INSERTIONS, &drawn(30.0))
 }
 
-/// The program ends and is started again: the page says so, shows old data as old, and is back by itself.
+/// The program ends and is started again: the page says so, shows old data as old, and is back by
+/// itself.
 fn come_back(page: &mut Page, program: &mut Program, path: &Path) -> Result<(), Error> {
     program.end();
     page.wait(
@@ -385,7 +398,8 @@ fn come_back(page: &mut Page, program: &mut Program, path: &Path) -> Result<(), 
         "document.body.dataset.link === 'live' && document.getElementById('banner').hidden",
     )?;
     page.wait("the needle deep again", A_FEW_INSERTIONS, "__stats.depthMm > 6")?;
-    // The browser itself notes each attempt to reach a program that is not there; nothing else may be noted.
+    // The browser itself notes each attempt to reach a program that is not there; nothing else may
+    // be noted.
     let complaints: Vec<_> =
         page.complaints()?.into_iter().filter(|text| !text.contains("WebSocket connection")).collect();
     check("no other errors in the console", complaints.is_empty(), &complaints)

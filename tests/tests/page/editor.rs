@@ -1,12 +1,14 @@
-//! A patient for tomorrow's class, made by somebody who writes no file: four sliders with a picture, a step taken back, a name. It can be
-//! chosen in another run and the needle is driven into it.
+//! A patient for tomorrow's class, made by somebody who writes no file: four sliders with a
+//! picture, a step taken back, a name. It can be chosen in another run and the needle is driven
+//! into it.
 
 use crate::needle::{A_FEW_INSERTIONS, SIZES, SOON, complaints, open, pictures, resize};
 use std::path::Path;
 use std::time::{Duration, Instant};
 use tests::browser::{Chromium, Error, Page, Places, Program, check};
 
-/// The time in which a person is to be done. The test, which does not think, has to be done in it as well.
+/// The time in which a person is to be done. The test, which does not think, has to be done in it
+/// as well.
 const A_MINUTE: Duration = Duration::from_secs(60);
 const ANSWER: &str = "document.getElementById('patient-answer')";
 

@@ -1,5 +1,5 @@
-//! The limb by WebGPU, which most browsers have and headless ones only on request: it is the same picture as by WebGL 2, and where
-//! the graphics processor is lost the page goes on with WebGL 2.
+//! The limb by WebGPU, which most browsers have and headless ones only on request: it is the same
+//! picture as by WebGL 2, and where the graphics processor is lost the page goes on with WebGL 2.
 
 use serde_json::Value;
 use std::time::Duration;

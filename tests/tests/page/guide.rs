@@ -1,5 +1,5 @@
-//! The guide in the page: `commission --page` asks before each step and shows what came of it; `compensate`'s gains are changed in the
-//! page while a hand feels them.
+//! The guide in the page: `commission --page` asks before each step and shows what came of it;
+//! `compensate`'s gains are changed in the page while a hand feels them.
 
 use std::fs;
 use std::time::Duration;

@@ -1,5 +1,6 @@
-//! The limb in a headset, with Meta's emulation of one (`iwer`): two eyes see it, the head moves, the needle is the device's. What only a
-//! real headset shows, such as its pictures a second and how it feels, is not tested here.
+//! The limb in a headset, with Meta's emulation of one (`iwer`): two eyes see it, the head moves,
+//! the needle is the device's. What only a real headset shows, such as its pictures a second and
+//! how it feels, is not tested here.
 
 use serde_json::{Value, json};
 use std::time::Duration;
@@ -14,7 +15,8 @@ const EMULATE: &str = "{
     emulated.position.set(0, 1.6, 0);
 }";
 const BUTTON: &str = "document.getElementById('headset')";
-/// The entry's place in each eye's picture, −1 to 1 from left to right and from bottom to top, and the eye's in mm.
+/// The entry's place in each eye's picture, −1 to 1 from left to right and from bottom to top, and
+/// the eye's in mm.
 const SEEN: &str = "__body.headset.eyes.map(({ view, eye, target }) => ({
     across: view[12] / view[15], up: view[13] / view[15], eye: [...eye], viewport: [...target.viewport],
 }))";
@@ -84,7 +86,8 @@ fn eyes(page: &mut Page) -> Result<Vec<Value>, Error> {
     seen.as_array().cloned().ok_or_else(|| format!("no eyes: {seen}"))
 }
 
-/// Each eye has its half, sees the entry from its own side, and sees more than a sky; the head's way is the eyes'.
+/// Each eye has its half, sees the entry from its own side, and sees more than a sky; the head's
+/// way is the eyes'.
 fn both_eyes(page: &mut Page) -> Result<(), Error> {
     let before = eyes(page)?;
     let [left, right] = before.as_slice() else { return Err(format!("two eyes and not {before:?}")) };

@@ -1,5 +1,5 @@
-//! The page in German and French: one file of texts for each language, chosen by the browser's languages or by the person, with room for
-//! the longer words.
+//! The page in German and French: one file of texts for each language, chosen by the browser's
+//! languages or by the person, with room for the longer words.
 
 use crate::needle::{LIVE, SIZES, SOON, Size, complaints, open, resize};
 use serde_json::{Value, json};
@@ -9,8 +9,8 @@ use std::path::{Path, PathBuf};
 use tests::browser::{Chromium, Error, Page, Places, Program, check};
 
 const LANGUAGES: [&str; 3] = ["en", "de", "fr"];
-/// The namespaces of keys that are put together by the page: `state.` and what the device says, `figure.` and the
-/// key of a patient, or `said.` and the name of a sentence.
+/// The namespaces of keys that are put together by the page: `state.` and what the device says,
+/// `figure.` and the key of a patient, or `said.` and the name of a sentence.
 const PUT_TOGETHER: [&str; 6] = ["figure.", "state.", "tissue.", "task.", "said.", "unit."];
 
 fn page_folder() -> PathBuf {
@@ -166,7 +166,8 @@ fn fits(page: &mut Page, language: &str, state: &str, size: Size) -> Result<(), 
     check(&format!("{language}, {state}: Stop on top"), hit == json!("stop"), (size, &hit))
 }
 
-/// Elements that are wider inside than outside, without those that end in … by intent: names of files and profiles.
+/// Elements that are wider inside than outside, without those that end in … by intent: names of
+/// files and profiles.
 const TOO_WIDE: &str = "(() => {
     const shortened = ['subtitle', 'device', 'recording', 'tick'];
     const wide = [...document.querySelectorAll('body *')].filter(e => e.checkVisibility() && e.clientWidth > 0

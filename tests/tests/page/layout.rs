@@ -1,4 +1,5 @@
-//! The layout on a desktop: nothing scrolls that could be seen at once, and the list of attempts has room.
+//! The layout on a desktop: nothing scrolls that could be seen at once, and the list of attempts
+//! has room.
 
 use crate::needle::{SOON, complaints, open, pictures, resize};
 use std::time::Duration;

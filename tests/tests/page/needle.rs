@@ -1,12 +1,14 @@
-//! One needle in the hand of a person, by mouse and by finger: a millimetre of the hand is a millimetre of the needle at every depth
-//! and size, tip and hub stay in the picture, and the layers are drawn at their depths at any angle.
+//! One needle in the hand of a person, by mouse and by finger: a millimetre of the hand is a
+//! millimetre of the needle at every depth and size, tip and hub stay in the picture, and the
+//! layers are drawn at their depths at any angle.
 
 use serde_json::{Value, json};
 use std::path::Path;
 use std::time::Duration;
 use tests::browser::{Chromium, Error, Page, Places, Program, check};
 
-/// A size of the page: width and height in CSS pixels, and true if a finger drags instead of a mouse.
+/// A size of the page: width and height in CSS pixels, and true if a finger drags instead of a
+/// mouse.
 pub(crate) type Size = (u32, u32, bool);
 /// Desktop, laptop, phone and a 4K screen.
 pub(crate) const SIZES: [Size; 4] =
@@ -17,15 +19,18 @@ pub(crate) const SOON: Duration = Duration::from_secs(30);
 pub(crate) const A_FEW_INSERTIONS: Duration = Duration::from_secs(60);
 /// Condition that the page shows live data.
 pub(crate) const LIVE: &str = "document.body.dataset.link === 'live' && !isNaN(__stats.firstFrameMs)";
-/// Stiffness of the hand's grip, in N/mm (`host-sim/procedures/venepuncture.toml`): a force bends it.
+/// Stiffness of the hand's grip, in N/mm (`host-sim/procedures/venepuncture.toml`): a force bends
+/// it.
 const GRIP_N_PER_MM: f64 = 1.0;
 /// Largest error of hand and needle, as a share of the depth.
 const TRUE_WITHIN: f64 = 0.02;
-/// Places behind the adult's far wall, which gives way at about 15.6 mm at 30°, in mm along the needle.
+/// Places behind the adult's far wall, which gives way at about 15.6 mm at 30°, in mm along the
+/// needle.
 const BEHIND_THE_WALL_MM: [f64; 4] = [16.0, 18.0, 20.0, 22.0];
 /// Length of the adult's needle at 30°, in mm: the hub is on the skin.
 const LENGTH_MM: f64 = 25.0;
-/// Angle in degrees at which the far wall is so far along the needle that a needle of 50 mm is used.
+/// Angle in degrees at which the far wall is so far along the needle that a needle of 50 mm is
+/// used.
 const FLAT_DEG: &str = "14";
 
 #[test]
@@ -158,7 +163,8 @@ impl Grab {
 /// A depth outside at which the scripted hand begins, too, within a millimetre.
 pub(crate) const OUTSIDE_MM: f64 = -5.0;
 
-/// Drags the needle in single millimetres to each of `depths`, which lie behind the far wall, beyond its hub, and out again.
+/// Drags the needle in single millimetres to each of `depths`, which lie behind the far wall,
+/// beyond its hub, and out again.
 fn follow(page: &mut Page, size: Size, depths: &[f64], hub_at: Option<f64>) -> Result<(), Error> {
     page.wait("the needle outside", A_FEW_INSERTIONS, "__stats.depthMm < -4")?;
     let grab = Grab::take(page, size.2)?;

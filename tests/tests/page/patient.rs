@@ -1,4 +1,5 @@
-//! A patient is chosen and edited in the page while the demo goes on; a recording is played and scrubbed.
+//! A patient is chosen and edited in the page while the demo goes on; a recording is played and
+//! scrubbed.
 
 use serde_json::json;
 use std::path::Path;
@@ -10,8 +11,9 @@ const DESKTOP: (u32, u32) = (1440, 900);
 const SOON: Duration = Duration::from_secs(10);
 /// The scripted venepuncture takes 6 s; a busy machine may be slow to begin.
 const A_FEW_INSERTIONS: Duration = Duration::from_secs(40);
-/// Firm skin gives way at 1.5 N, the adult's at 1 N. Read from the list, which begins anew with each patient: the force itself is
-/// there for a few ms, and a browser without a graphics processor may not draw them.
+/// Firm skin gives way at 1.5 N, the adult's at 1 N. Read from the list, which begins anew with
+/// each patient: the force itself is there for a few ms, and a browser without a graphics processor
+/// may not draw them.
 const FIRM_SKIN_PUNCTURED: &str = "[...document.querySelectorAll('#events [data-kind=puncture] span')].some(e => \
      /^Skin punctured at \\d+\\.\\d\\smm, 1\\.[2-9]\\d\\sN$/.test(e.textContent))";
 
@@ -37,7 +39,8 @@ fn edit_and_scrub() -> Result<(), Error> {
     scrub(&browser, &places.program, &recording)
 }
 
-/// A patient is chosen, edited and sent: the device takes it whole, or refuses it and the page says why.
+/// A patient is chosen, edited and sent: the device takes it whole, or refuses it and the page says
+/// why.
 fn patients(page: &mut Page, scratch: &Path) -> Result<(), Error> {
     page.click("patient")?;
     page.wait("the editor", SOON, "document.getElementById('patient-editor').open")?;
@@ -86,7 +89,8 @@ fn record(path: &Path, recording: &Path) -> Result<(), Error> {
     check("a recording", status.success(), status)
 }
 
-/// A recording is played, paused, and moved to and fro: the page shows that place and nothing of another.
+/// A recording is played, paused, and moved to and fro: the page shows that place and nothing of
+/// another.
 fn scrub(browser: &Chromium, path: &Path, recording: &Path) -> Result<(), Error> {
     let file = recording.to_str().ok_or("the target folder has a plain name")?;
     let program = Program::start_with(path, &["replay", file, "--port", "0"])?;
@@ -120,8 +124,8 @@ fn scrub(browser: &Chromium, path: &Path, recording: &Path) -> Result<(), Error>
     check("no errors in the console", complaints.is_empty(), &complaints)
 }
 
-/// A recording has no device to start, no hand and no patient to choose: their controls are not there, and its computed force is
-/// drawn at the place that was sought.
+/// A recording has no device to start, no hand and no patient to choose: their controls are not
+/// there, and its computed force is drawn at the place that was sought.
 fn only_what_a_recording_has(page: &mut Page) -> Result<(), Error> {
     let shown = page.evaluate(
         "[...document.querySelectorAll('button, input, select')].filter(e => e.checkVisibility()).map(e => e.id)",

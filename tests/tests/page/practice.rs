@@ -1,5 +1,5 @@
-//! Practice in the page: a goal, a verdict after each withdrawal, the attempts compared with the best one, the learning curve, and
-//! recordings that never replace one another.
+//! Practice in the page: a goal, a verdict after each withdrawal, the attempts compared with the
+//! best one, the learning curve, and recordings that never replace one another.
 
 use crate::needle::{A_FEW_INSERTIONS, Grab, OUTSIDE_MM, SIZES, SOON, complaints, open};
 use std::path::Path;
@@ -46,7 +46,8 @@ fn visit() -> Result<(), Error> {
         &format!("{ROWS}.length > 0 && {ROWS}[0].textContent.includes('demo') && {ROWS}[0].textContent.includes('reached')"),
     )?;
     page.wait("the needle outside", A_FEW_INSERTIONS, "__stats.depthMm < -3")?;
-    // The scripted hand may have put the tourniquet on for its next insertion, which is this one; it does nothing from now on.
+    // The scripted hand may have put the tourniquet on for its next insertion, which is this one;
+    // it does nothing from now on.
     insert(&mut page, IN_VEIN_MM)?;
     page.wait("a verdict", SOON, &format!("{VERDICT} !== ''"))?;
     record(&mut page, "monday")?;
@@ -166,7 +167,8 @@ fn both_can_be_read(program: &Path, scratch: &Path) -> Result<(), Error> {
     check("none in the second", second.status.code() == Some(2), String::from_utf8_lossy(&second.stderr))
 }
 
-/// Eight successes in a row pass, seven do not, and a miss puts it off: Kestin's rule at 20 and 40 % failures and errors of 10 %.
+/// Eight successes in a row pass, seven do not, and a miss puts it off: Kestin's rule at 20 and 40
+/// % failures and errors of 10 %.
 fn pass_mark(page: &mut Page) -> Result<(), Error> {
     let passed = |page: &mut Page, reached: &str| {
         page.number(&format!(

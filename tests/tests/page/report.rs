@@ -1,5 +1,6 @@
-//! The plots of a report: values under the pointer, a stretch that is dragged over shown alone with values and ticks of its own, and the
-//! whole again. The curve is a known one, so that the values can be checked.
+//! The plots of a report: values under the pointer, a stretch that is dragged over shown alone with
+//! values and ticks of its own, and the whole again. The curve is a known one, so that the values
+//! can be checked.
 
 use std::fmt::Write as _;
 use std::process::Command;

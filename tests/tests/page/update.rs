@@ -1,4 +1,5 @@
-//! The update over USB, on a bootloader with the rules of AN3156: the order of its transfers, and what it refuses.
+//! The update over USB, on a bootloader with the rules of AN3156: the order of its transfers, and
+//! what it refuses.
 
 use board_wasm::dfu::{Next, Update};
 use tests::bootloader::{Bootloader, FLASH, MEMORY, OLD};
@@ -63,7 +64,8 @@ fn run(bootloader: &mut Bootloader, file: &[u8]) -> Result<(), String> {
     }
 }
 
-/// True if the flash holds the image, 0xFF behind it in its last sector, and what was there before in all others.
+/// True if the flash holds the image, 0xFF behind it in its last sector, and what was there before
+/// in all others.
 fn holds(bootloader: &Bootloader, image: &[u8]) -> bool {
     // 70,001 bytes: the four sectors of 16 KiB, and one of 64.
     let (touched, others) = bootloader.flash.split_at(128 << 10);

@@ -1,5 +1,5 @@
-//! The second view of the page (limb and ultrasound) from the program, and the whole simulator from a folder without a
-//! server, as `cargo xtask site` writes it.
+//! The second view of the page (limb and ultrasound) from the program, and the whole simulator from
+//! a folder without a server, as `cargo xtask site` writes it.
 
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -31,7 +31,8 @@ fn visit() -> Result<(), Error> {
     look(&browser, &site(&places.target)?, &scratch.join("site.png"))
 }
 
-/// The recording says where the probe was: the tip was seen in one insertion for some of the time and in another less.
+/// The recording says where the probe was: the tip was seen in one insertion for some of the time
+/// and in another less.
 fn probe_is_recorded(program: &Path, file: &Path) -> Result<(), Error> {
     let output = Command::new(program).arg("score").arg(file).arg("--json").output();
     let output = output.map_err(|cause| format!("score does not start: {cause}"))?;
@@ -51,7 +52,8 @@ fn site(target: &Path) -> Result<String, Error> {
     Err(format!("no site at {}: run `cargo xtask site`", page.display()))
 }
 
-/// The needle goes in by itself; the second view shows it, in the ultrasound's plane, until the probe is moved away.
+/// The needle goes in by itself; the second view shows it, in the ultrasound's plane, until the
+/// probe is moved away.
 fn look(browser: &Chromium, url: &str, photograph: &Path) -> Result<(), Error> {
     let mut page = Page::open(browser, url, 1_440, 900, false)?;
     page.wait("a needle", SOME_TIME, "__stats.depthMm > -100")?;

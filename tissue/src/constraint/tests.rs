@@ -30,7 +30,8 @@ fn a_flat_pair_has_angle_zero_and_a_right_fold_a_quarter_turn() {
     assert!((bending_angle(folded).abs() - std::f32::consts::FRAC_PI_2).abs() < 1e-5);
 }
 
-/// With λ kept, a spring under a steady load settles at load × compliance however many iterations there are.
+/// With λ kept, a spring under a steady load settles at load × compliance however many iterations
+/// there are.
 #[test]
 fn compliance_is_what_it_says_whatever_the_iterations() {
     let spring = Distance { ends: [0, 1], rest: 1.0, compliance: 2e-3 };
@@ -54,7 +55,8 @@ fn compliance_is_what_it_says_whatever_the_iterations() {
     }
 }
 
-/// Pairs of three particles solved together: more iterations come nearer to the exact solution of the linear system.
+/// Pairs of three particles solved together: more iterations come nearer to the exact solution of
+/// the linear system.
 #[test]
 fn a_projection_restores_a_volume_and_keeps_the_centre_of_mass() {
     let mut points = CORNERS.map(|p| [p[0], p[1], p[2], 1.0]);

@@ -1,7 +1,7 @@
 //! The modules of one crate, and which of its files use which.
 
-use super::Uses;
 use super::source::Source;
+use super::{SKIPPED, Uses};
 use std::collections::BTreeMap;
 use std::fs;
 use std::io;
@@ -27,7 +27,8 @@ impl Crate {
         Ok(Self::of(files.iter().map(|(name, text)| (name.clone(), text.as_str()))))
     }
 
-    /// A crate of sources by their paths below `src`. A program beside a library is the same crate's root.
+    /// A crate of sources by their paths below `src`. A program beside a library is the same
+    /// crate's root.
     pub(super) fn of<'a>(files: impl Iterator<Item = (String, &'a str)>) -> Self {
         let mut modules = BTreeMap::new();
         for (file, text) in files {
@@ -42,8 +43,8 @@ impl Crate {
         Self { modules }
     }
 
-    /// The uses of every file, also of one that a macro declares; files that only tests declare are left out, and so is what a module
-    /// uses of the modules that it is made of.
+    /// The uses of every file, also of one that a macro declares; files that only tests declare are
+    /// left out, and so is what a module uses of the modules that it is made of.
     pub(super) fn uses(&self) -> Uses {
         let used = self.modules.keys().filter(|path| !self.is_for_tests(path));
         used.map(|path| (self.modules[path].file.clone(), self.uses_of(path))).collect()
@@ -135,6 +136,9 @@ fn visit(folder: &Path, path: &str, files: &mut Vec<(String, String)>) -> io::Re
         let Some(name) = name.to_str() else { continue };
         let below = if path.is_empty() { name.to_owned() } else { format!("{path}/{name}") };
         if entry.file_type()?.is_dir() {
+            if SKIPPED.contains(&name) {
+                continue;
+            }
             visit(&entry.path(), &below, files)?;
         } else if name.ends_with(".rs") {
             files.push((below, fs::read_to_string(entry.path())?));

@@ -1,5 +1,5 @@
-//! Functions that are longer than a reader holds in mind. The sources are formatted, so that a function ends at the first brace that stands as
-//! far to the left as its own line.
+//! Functions that are longer than a reader holds in mind. The sources are formatted, so that a
+//! function ends at the first brace as far to the left as its own line.
 
 /// Most lines of a function, its signature and its last brace included.
 const MOST: usize = 60;

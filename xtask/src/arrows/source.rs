@@ -1,4 +1,5 @@
-//! Reads what a source file declares and names: its code without comments, literals and tests, its `use` declarations, and its paths.
+//! Reads what a source file declares and names: its code without comments, literals and tests, its
+//! `use` declarations, and its paths.
 
 /// A path of a `use` declaration, groups written out.
 pub(super) struct Use {

@@ -9,7 +9,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Rows of the recording that are fitted, at 10 kHz: 4 s. SciPy's simulation is in Python and takes seconds for each of them.
+/// Rows of the recording that are fitted, at 10 kHz: 4 s. SciPy's simulation is in Python and takes
+/// seconds for each of them.
 const ROWS: usize = 40_000;
 
 /// Our fit alone, for a machine on which the peer is absent.
@@ -18,7 +19,8 @@ pub(crate) fn ours() -> Result<Values, Error> {
     shell::output(Command::new(program).arg(rig).arg(recording)).map(|text| values_in(&text))
 }
 
-/// Both by turns: the script runs our program itself, and prints the row, its peer, and by how much the answers differ.
+/// Both by turns: the script runs our program itself, and prints the row, its peer, and by how much
+/// the answers differ.
 pub(crate) fn with_peer() -> Result<Values, Error> {
     let mut python = programs::python("parameter_fit.py")?;
     let (program, rig, recording) = prepared()?;

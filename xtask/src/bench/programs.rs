@@ -38,7 +38,8 @@ pub(crate) fn test_modules() -> Result<Vec<TestModule>, Error> {
 }
 
 impl TestModule {
-    /// True if the tests print rows, of which their text names one as a word or in JSON, or lines of the board's own table.
+    /// True if the tests print rows, of which their text names one as a word or in JSON, or lines
+    /// of the board's own table.
     pub(crate) fn measures(&self, wants: impl Fn(&str) -> bool) -> bool {
         let text = &self.text;
         (text.contains(&format!("\"{BOARD_LINE}")) && wants(BOARD_LINE))
@@ -94,7 +95,7 @@ pub(crate) const PEERS: [(&str, &str); 3] =
 /// The Python packages that the peers need.
 pub(crate) const PEERS_PACKAGES: [&str; 3] = ["numpy==2.4.6", "mujoco==4.0.0", "scipy==1.17.1"];
 
-/// Runs one of them: it prints the row that it stands beside.
+/// Runs one of them: it prints the row that it is next to.
 pub(crate) fn peer(script: &str) -> Result<Values, Error> {
     shell::output(&mut python(script)?).map(|text| values_in(&text))
 }

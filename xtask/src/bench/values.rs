@@ -1,4 +1,5 @@
-//! Reads the output of the measuring programs: values by the name of their row, peers, and lines of the board's own table.
+//! Reads the output of the measuring programs: values by the name of their row, peers, and lines of
+//! the board's own table.
 
 use crate::rows::ROWS;
 use std::collections::BTreeMap;
@@ -12,13 +13,14 @@ pub(crate) const WORK: &str = "work";
 /// The measured values, by name.
 pub(crate) type Values = BTreeMap<String, String>;
 
-/// The lines of the board's own table; whatever the test runner wrote before a line is not part of it.
+/// The lines of the board's own table; whatever the test runner wrote before a line is not part of
+/// it.
 pub(crate) fn board_lines_in(text: &str) -> impl Iterator<Item = String> {
     text.lines().filter_map(|line| Some(line.get(line.find(BOARD_LINE)?..)?.to_string()))
 }
 
-/// `name=value` among the words of `text`, and rows in JSON, where the table knows the name; the time of work by the name of
-/// that.
+/// `name=value` among the words of `text`, and rows in JSON, where the table knows the name; the
+/// time of work by the name of that.
 pub(crate) fn values_in(text: &str) -> Values {
     let known = |name: &str| {
         let first = name.split('.').next();

@@ -1,4 +1,5 @@
-//! Measures the whole program: its build, its packages, the image, a minute of streaming, a diagnosis.
+//! Measures the whole program: its build, its packages, the image, a minute of streaming, a
+//! diagnosis.
 
 use super::values::Values;
 use crate::elf::Elf;
@@ -77,7 +78,8 @@ pub(crate) fn stream() -> Result<Values, Error> {
     Ok(Values::from([("stream_samples_per_s".into(), format!("{:.0}", samples / seconds))]))
 }
 
-/// About a minute of recording to fit, and another one to judge, made by the virtual device; their folder.
+/// About a minute of recording to fit, and another one to judge, made by the virtual device; their
+/// folder.
 pub(crate) fn recordings() -> Result<PathBuf, Error> {
     let folder = shell::target().join("bench-recordings");
     let program = built(&["--bin", MAIN], MAIN)?;
@@ -98,7 +100,8 @@ pub(crate) fn diagnosis() -> Result<Values, Error> {
     Ok(values)
 }
 
-/// Runs a program to its end: its time in s, and the most memory that it had, in KiB, where the system counts that.
+/// Runs a program to its end: its time in s, and the most memory that it had, in KiB, where the
+/// system counts that.
 fn watched(program: &mut Command) -> Result<(f64, Option<f64>), Error> {
     let begin = Instant::now();
     let mut child =

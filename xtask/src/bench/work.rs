@@ -11,7 +11,7 @@ pub(crate) struct Work {
     taken: Vec<(f64, f64)>,
 }
 
-/// From this on a ratio is told from 1, and its reason is printed.
+/// From this on a ratio is distinguished from 1, and its reason is printed.
 const APART: f64 = 1.2;
 
 /// The subjects, and what makes their cost grow other than their work.
@@ -26,7 +26,8 @@ const REASONS: [(&str, &str); 4] = [
 ];
 
 impl Work {
-    /// Time per work at the largest amount over that at the smallest: 1 where the cost grows as the work does.
+    /// Time per work at the largest amount over that at the smallest: 1 where the cost grows as the
+    /// work does.
     fn growth(&self) -> Option<f64> {
         let ((least, short), (most, long)) = (self.taken.first()?, self.taken.last()?);
         (most > least && *short > 0.0).then(|| (long / most) / (short / least))

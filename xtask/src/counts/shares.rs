@@ -1,5 +1,6 @@
-//! Shares of the source files in a profile of callgrind, as `callgrind_annotate` prints them: one line for each function and each
-//! file of which code was inlined into it. By file, because a whole tick is inlined into one function.
+//! Shares of the source files in a profile of callgrind, as `callgrind_annotate` prints them: one
+//! line for each function and each file of which code was inlined into it. By file, because a whole
+//! tick is inlined into one function.
 
 use std::collections::BTreeMap;
 
@@ -14,7 +15,8 @@ pub(super) fn of(annotated: &str) -> Vec<(String, f64)> {
     shares
 }
 
-/// A line such as `39,750,811 (21.05%)  /top/control-core/src/controller.rs:control_core::Controller::tick [/program]`.
+/// A line such as `39,750,811
+/// (21.05%) /top/control-core/src/controller.rs:control_core::Controller::tick [/program]`.
 fn line(line: &str) -> Option<(String, f64)> {
     let (_, rest) = line.split_once('(')?;
     let (percent, rest) = rest.split_once("%)")?;

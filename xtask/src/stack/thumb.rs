@@ -1,4 +1,5 @@
-//! As much of the Thumb instruction set as tells stack use and calls (ARMv7-M Architecture Reference Manual, chapter A7).
+//! As much of the Thumb instruction set as tells stack use and calls (ARMv7-M Architecture
+//! Reference Manual, chapter A7).
 
 use crate::elf::{Elf, Symbol};
 use crate::shell::Error;

@@ -5,7 +5,8 @@ pub(super) struct Word {
     pub(super) text: String,
     /// The line it is on, from 1.
     pub(super) line: usize,
-    /// True if only blanks, a line break or a comment's marker stand between it and the word before.
+    /// True if only blanks, a line break or a comment's marker stand between it and the word
+    /// before.
     pub(super) follows: bool,
 }
 
@@ -49,7 +50,8 @@ fn is_letter(letter: char) -> bool {
     letter.is_alphanumeric() || matches!(letter, '_' | '-' | '\'' | '’')
 }
 
-/// Returns `source` with every character of code replaced by [`BREAK`]; line breaks and blanks stay.
+/// Returns `source` with every character of code replaced by [`BREAK`]; line breaks and blanks
+/// stay.
 fn comments_and_strings(source: &str) -> String {
     let mut prose = String::with_capacity(source.len());
     for (kind, piece) in Pieces(source) {
@@ -154,7 +156,8 @@ fn raw_string(text: &str) -> Option<usize> {
     Some(text.len() - inside.len() + length)
 }
 
-/// The length of the literal that `text` begins with, from one `quote` to the next that no backslash precedes.
+/// The length of the literal that `text` begins with, from one `quote` to the next that no
+/// backslash precedes.
 fn quoted(text: &str, quote: char) -> usize {
     let mut is_escaped = false;
     for (at, letter) in text.char_indices().skip(1) {
@@ -166,7 +169,8 @@ fn quoted(text: &str, quote: char) -> usize {
     text.len()
 }
 
-/// The length of the character literal that `text` begins with; of its apostrophe alone if that begins a lifetime.
+/// The length of the character literal that `text` begins with; of its apostrophe alone if that
+/// begins a lifetime.
 fn character(text: &str) -> usize {
     let mut letters = text.char_indices().skip(1);
     let first = letters.next();

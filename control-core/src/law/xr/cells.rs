@@ -6,7 +6,8 @@ use crate::units::{MillimetresPerSecond, Milliradians};
 /// All of a weight, Q16.
 const WHOLE: u32 = 1 << 16;
 
-/// The values for finding a place among speeds and angles: one over the gap from each knot to the next, Q24.
+/// The values for finding a place among speeds and angles: one over the gap from each knot to the
+/// next, Q24.
 #[derive(Clone, Debug)]
 pub(super) struct Gaps {
     speed: [i32; MAX_SPEEDS],
@@ -20,7 +21,8 @@ impl Gaps {
     }
 }
 
-/// The cells around a speed and an angle. Speed and angle change slowly: each is looked up in one tick of four.
+/// The cells around a speed and an angle. Speed and angle change slowly: each is looked up in one
+/// tick of four.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Cells {
     speed: Place,
@@ -93,7 +95,8 @@ impl Cells {
         self.is_estimated = self.corners.iter().any(is_missing);
     }
 
-    /// Returns what lies between the values of the cells, Q16; the one of cell `n` is `values[n · stride]`.
+    /// Returns the value between those of the cells, Q16; the one of cell `n` is `values[n ·
+    /// stride]`.
     #[inline(always)]
     pub(super) fn mix(&self, values: &[u16], stride: usize) -> i32 {
         let weighed =
@@ -135,7 +138,8 @@ fn angle_place(table: &ForceTable, gaps: &Gaps, angle: Milliradians) -> Place {
     place(angle_knots(table), &gaps.angle, i32::from(angle.0) << 16)
 }
 
-/// One over the gaps between `knots` in Q16. The last knot's gap does not matter: nothing lies beyond it.
+/// One over the gaps between `knots` in Q16. The last knot's gap does not matter: nothing is beyond
+/// it.
 fn per_gap<const N: usize>(knots: impl Iterator<Item = i32> + Clone) -> [i32; N] {
     let mut gaps = [0; N];
     for (gap, (from, to)) in gaps.iter_mut().zip(knots.clone().zip(knots.skip(1))) {

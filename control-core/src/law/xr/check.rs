@@ -1,4 +1,5 @@
-//! Which force tables may run: knots in their order, no force above the motor's, no slope that the hold could not follow.
+//! Which force tables may run: knots in their order, no force above the motor's, no slope that the
+//! hold could not follow.
 
 use super::ForceTable;
 use crate::anatomy::SMALLEST_ANGLE;

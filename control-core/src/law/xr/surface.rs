@@ -1,8 +1,9 @@
-//! The displacement of the tissue's surface, as the picture's dynamics give it: depth may be counted from there instead of from where the
-//! surface was at rest.
+//! The displacement of the tissue's surface, as the picture's dynamics give it: depth may be
+//! counted from there instead of from where the surface was at rest.
 //!
-//! Whoever computes a picture may be late, wrong or gone. So the displacement is bounded, changes no faster than a slow hand, and goes
-//! back to 0 by itself if it is not renewed: a picture that stands still takes its effect with it.
+//! Whoever computes a picture may be late, wrong or gone. So the displacement is bounded, changes
+//! no faster than a slow hand, and goes back to 0 by itself if it is not renewed: a picture that
+//! stands still takes its effect with it.
 
 use crate::units::Millimetres;
 use fixed::types::I16F16;

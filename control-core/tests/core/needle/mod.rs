@@ -3,7 +3,8 @@
 use control_core::units::{Counts, Milliradians};
 use control_core::{Config, Controller, Order, TickInput, TickOutput};
 
-/// The position of a new needle: counts, and as mm along the needle at the default roller's 15.7 µm a count.
+/// The position of a new needle: counts, and as mm along the needle at the default roller's 15.7 µm
+/// a count.
 const BEGINS_COUNTS: i32 = -60;
 const BEGINS_MM: f64 = -0.94;
 

@@ -1,5 +1,6 @@
-//! Fixed point against its floating-point twin: over any valid configuration and any walk of the needle the two stay
-//! within one step of the converter, and nothing overflows or panics whatever the counts.
+//! Fixed point against its floating-point twin: over any valid configuration and any walk of the
+//! needle the two stay within one step of the converter, and nothing overflows or panics whatever
+//! the counts.
 
 mod model;
 
@@ -81,11 +82,13 @@ fn friction(stiffest: f64, strongest: f64) -> impl Strategy<Value = FrictionLaw>
 /// A wall that is likely to be valid: its slope and force are shares of what is allowed.
 fn wall(stiffest: f64, strongest: f64) -> impl Strategy<Value = Option<Wall>> {
     let parts = (0.1..0.5_f64, 0.05..0.8_f64, 0.2..5.0_f64, 0.0..1.0_f64, 0.05..0.4_f64);
-    // How far before contact the rising parabola turns, and how much of the relief stays permanently; mostly neither.
+    // How far before contact the rising parabola turns, and how much of the relief stays
+    // permanently; mostly neither.
     let shapes = (prop_oneof![Just(0.0), 0.0..1.0_f64], prop_oneof![Just(0.0), 0.0..1.0_f64]);
     let wall = (parts, shapes).prop_map(move |((slope, force, beyond, relief, unload), (before, stays))| {
         let (slope, force) = (slope * stiffest, force * strongest);
-        // f = ((T + k·T_p)² − (k·T_p)²)/a, of which the force and the slope at the puncture T_p are known.
+        // f = ((T + k·T_p)² − (k·T_p)²)/a, of which the force and the slope at the puncture T_p are
+        // known.
         let puncture = (2.0 * force * (1.0 + before) / (slope * (1.0 + 2.0 * before))).clamp(0.05, 20.0);
         let compliance = (2.0 * puncture * (1.0 + before) / slope).clamp(0.05, 1_000.0);
         let vertex = -before * puncture;
@@ -142,7 +145,8 @@ fn valid_config() -> impl Strategy<Value = (Config, Plan)> {
                     limits,
                     speed,
                     damping: Damping(I8F24::from_bits(damping)),
-                    // The observer decides by the sign of an energy; `passivity.rs` tests it by itself.
+                    // The observer decides by the sign of an energy; `passivity.rs` tests it by
+                    // itself.
                     passivity_damping: Damping::default(),
                     ..device
                 },
@@ -164,8 +168,9 @@ fn legs() -> impl Strategy<Value = Vec<(f64, u16)>> {
     prop::collection::vec(prop_oneof![4 => slow, 2 => fast, 1 => rest], 1..24)
 }
 
-/// Legs of a speed each, at most `largest` counts a tick, joined as a hand joins them: with an acceleration that no
-/// watch takes for a motor that is wired wrongly, and a rest before either end.
+/// Legs of a speed each, at most `largest` counts a tick, joined as a hand joins them: with an
+/// acceleration that no watch takes for a motor that is wired wrongly, and a rest before either
+/// end.
 fn walk(legs: &[(f64, u16)], largest: f64, furthest: i32) -> Vec<i32> {
     const PER_TICK: f64 = 0.004;
     let (mut at, mut speed, mut counts) = (0.0_f64, 0.0_f64, Vec::new());
@@ -183,8 +188,8 @@ fn walk(legs: &[(f64, u16)], largest: f64, furthest: i32) -> Vec<i32> {
     counts
 }
 
-/// Steps in a row, each of which undoes the one before, from which the watch on the encoder may hold the torque for 10 ms whatever the
-/// law says. The watch's own tests are in `runaway.rs`.
+/// Steps in a row, each of which undoes the one before, from which the watch on the encoder may
+/// hold the torque for 10 ms whatever the law says. The watch's own tests are in `runaway.rs`.
 const TO_AND_FRO: u32 = 3;
 
 /// The walk up to where its counts go to and fro.

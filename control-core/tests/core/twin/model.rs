@@ -1,12 +1,13 @@
-//! The floating-point twin of the whole tick, written from the equations (Paper 001 and the force laws of the design), not
-//! from the fixed-point code. It takes the configuration's own quantised values as exact.
+//! The floating-point twin of the whole tick, written from the equations (Paper 001 and the force
+//! laws of the design), not from the fixed-point code. It takes the configuration's own quantised
+//! values as exact.
 
 use control_core::TickOutput;
 use control_core::config::{Config, FrictionLaw, Law, Parabola, SpeedMethod};
 use control_core::event::{State, Transitions};
 
-/// The largest error of fixed-point lengths along a slanted needle, in mm: within it, the twin takes the core's word for
-/// which side of a threshold the tip is.
+/// The largest error of fixed-point lengths along a slanted needle, in mm: within it, the twin
+/// takes the core's word for which side of a threshold the tip is.
 const LENGTH_DOUBT_MM: f64 = 3e-4;
 /// The tip has left a layer when it is this far outside, in mm.
 const EXIT_MM: f64 = 13_107.0 / 65_536.0;
@@ -28,11 +29,13 @@ pub(crate) struct Twin {
     squared: f64,
     /// The largest torque that the heat allowed when it was last asked.
     allowed: f64,
-    /// The last change of the torque that is allowed, where the core may not have asked for it yet; zero elsewhere.
+    /// The last change of the torque that is allowed, where the core may not have asked for it yet;
+    /// zero elsewhere.
     unasked: f64,
     /// Tick of the last contact, puncture or exit.
     transition: u32,
-    /// The error of the heat by rounded forces: half of the last place of each wall, of friction and of damping.
+    /// The error of the heat by rounded forces: half of the last place of each wall, of friction
+    /// and of damping.
     heat_doubt: f64,
     /// A wall gave way in this tick, or in one since which a layer was touched in each.
     springing_back: bool,
@@ -81,8 +84,8 @@ impl Twin {
         }
     }
 
-    /// DAC steps away from mid-scale, before rounding, with the amplifier on since the first call. What the core has `told` of the
-    /// tip's way is checked against the anatomy.
+    /// DAC steps away from mid-scale, before rounding, with the amplifier on since the first call.
+    /// What the core has `told` of the tip's way is checked against the anatomy.
     pub(crate) fn tick(&mut self, count: i32, told: &TickOutput) -> f64 {
         let depth = f64::from(count) * self.mm_per_count;
         let speed = self.speed(count);
@@ -106,7 +109,8 @@ impl Twin {
         let slew = limits.slew_per_tick.0.to_num::<f64>();
         self.given = faded.clamp(self.given - slew, self.given + slew);
         let seconds = f64::from(limits.winding_time_s);
-        // The winding warms in one tick of eight, and is asked what it allows in one of sixteen, as in the controller.
+        // The winding warms in one tick of eight, and is asked what it allows in one of sixteen, as
+        // in the controller.
         self.squared += self.given * self.given;
         match self.ticks % 16 {
             0 | 8 => {
@@ -123,7 +127,8 @@ impl Twin {
         (self.given * span / device.full_scale_torque.0.to_num::<f64>()).clamp(-furthest, furthest)
     }
 
-    /// A tick in which the core meets a layer or leaves it has no time to ask, and the next occasion is sixteen ticks later.
+    /// A tick in which the core meets a layer or leaves it has no time to ask, and the next
+    /// occasion is sixteen ticks later.
     fn ask_what_is_allowed(&mut self) {
         let most = self.config.device.limits.torque.0.to_num::<f64>();
         let before = self.allowed.min(most);
@@ -132,8 +137,9 @@ impl Twin {
         self.unasked = if is_busy { (before - self.allowed).abs() } else { 0.0 };
     }
 
-    /// DAC steps that the torque limit may be off by for [`Twin::heat_doubt`]; none before heat limits. The limit falls over a
-    /// fifth of the heat, so that where a weak motor hangs on a strong amplifier the last places of long ago show.
+    /// DAC steps that the torque limit may be off by for [`Twin::heat_doubt`]; none before heat
+    /// limits. The limit falls over a fifth of the heat, so that where a weak motor hangs on a
+    /// strong amplifier the last places of long ago show.
     pub(crate) fn steps_of_heat(&self) -> f64 {
         let (most, largest) = (self.config.device.limits.torque.0.to_num::<f64>(), self.allowed);
         if largest >= most && self.unasked == 0.0 {
@@ -145,7 +151,8 @@ impl Twin {
         (self.heat_doubt * (most - continuous) / (continuous * continuous / 5.0) + self.unasked) * steps
     }
 
-    /// Falls from the torque limit to the continuous torque over the last fifth of the heat that is allowed.
+    /// Falls from the torque limit to the continuous torque over the last fifth of the heat that is
+    /// allowed.
     fn largest_torque(&self) -> f64 {
         let most = self.config.device.limits.torque.0.to_num::<f64>();
         let continuous = self.config.device.limits.continuous_torque.0.to_num::<f64>().min(most);
@@ -214,8 +221,9 @@ impl Twin {
         assert_eq!((contact, exit), (told.contact, told.exit), "at {depth} mm");
     }
 
-    /// Returns the extra depth of layer `next` where the tip comes to it: there, the remaining indentation of the wall
-    /// that gave way last is as long as the tip is past the layer's place at rest.
+    /// Returns the extra depth of layer `next` where the tip comes to it: there, the remaining
+    /// indentation of the wall that gave way last is as long as the tip is past the layer's place
+    /// at rest.
     fn carried_along(&self, next: usize, stretch: f64) -> f64 {
         let Some(last) = self.layers.iter().rposition(|layer| layer.open) else { return 0.0 };
         let wall = self.config.patient.layers[last].wall.expect("it has given way");

@@ -1,19 +1,22 @@
 //! The law of an effect.
 //!
-//! Forces are in N·m or N when a plant runs and per inertia, as accelerations, when a recording is fitted; a law is written once
-//! for both.
+//! Forces are in N·m or N when a plant runs and per inertia, as accelerations, when a recording is
+//! fitted; a law is written once for both.
 
 use crate::effects::joint_terms::JointTerms;
 use crate::effects::shape::ShapeKey;
 use crate::effects::{CommandLaw, Effect, State, Variable};
 
-/// A law with its state. The force is the sum of coefficient times term; laws in the sensor give travel instead.
+/// A law with its state. The force is the sum of coefficient times term; laws in the sensor give
+/// travel instead.
 pub(crate) trait ForceLaw: std::fmt::Debug + Send + Sync {
     /// Names of the terms, in the order of [`ForceLaw::terms`].
     fn names(&self) -> Vec<String>;
-    /// The terms for one step; `out` has one place per name. `velocity` is zero where its sign is unknown.
+    /// The terms for one step; `out` has one place per name. `velocity` is zero where its sign is
+    /// unknown.
     fn terms(&mut self, state: &State, velocity: f64, out: &mut [f64]);
-    /// The part of the force that holds an axis at rest, per unit of the first coefficient, where only a part does.
+    /// The part of the force that holds an axis at rest, per unit of the first coefficient, where
+    /// only a part does.
     fn dry_part(&self, _state: &State) -> f64 {
         0.0
     }
@@ -21,7 +24,8 @@ pub(crate) trait ForceLaw: std::fmt::Debug + Send + Sync {
     fn copy(&self) -> Box<dyn ForceLaw>;
 }
 
-/// A term of the rig's own model that is the same force as an effect: where the rig holds it, the effect cannot have been left out.
+/// A term of the rig's own model that is the same force as an effect: where the rig holds it, the
+/// effect cannot have been left out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum NominalTerm {
     /// Friction that grows with speed.
@@ -80,7 +84,8 @@ pub(crate) trait EffectLaw: Sync {
         false
     }
 
-    /// Returns the coupling of a second mass, where the law has one: such a law is faster than a block.
+    /// Returns the coupling of a second mass, where the law has one: such a law is faster than a
+    /// block.
     fn coupling(&self) -> Option<Coupling> {
         None
     }
@@ -88,6 +93,17 @@ pub(crate) trait EffectLaw: Sync {
     /// The term of the rig that is the same force.
     fn nominal_term(&self) -> Option<NominalTerm> {
         None
+    }
+
+    /// True if its law reads the command beside the motion.
+    fn reads_command(&self, _effect: &Effect) -> bool {
+        false
+    }
+
+    /// True if its force is in proportion to the drive's, which is what a fit of shares is to
+    /// explain.
+    fn follows_drive(&self, _effect: &Effect) -> bool {
+        false
     }
 
     /// True if it changes with the time of the recording.
@@ -100,13 +116,14 @@ pub(crate) trait EffectLaw: Sync {
         false
     }
 
-    /// True if its one term is the jumps of each recording's readings, which are found before any effect is: each of its moments
-    /// is decided by itself.
+    /// True if its one term is the jumps of each recording's readings, which are found before any
+    /// effect is: each of its moments is decided by itself.
     fn is_of_jumps(&self) -> bool {
         false
     }
 
-    /// Puts jumps that were found into an effect that is of them: times, s, and how far the reading jumps, rad or m.
+    /// Puts jumps that were found into an effect that is of them: times, s, and how far the reading
+    /// jumps, rad or m.
     fn put_jumps(&self, _effect: &mut Effect, _jumps: &[(f64, f64)]) {}
 
     /// Returns the keys of its shape, in groups.
@@ -114,7 +131,8 @@ pub(crate) trait EffectLaw: Sync {
         &[]
     }
 
-    /// Adds the effect to a joint and its motor, as other simulators have them; whether those can say it.
+    /// Adds the effect to a joint and its motor, as other simulators have them; whether those can
+    /// say it.
     fn add_to_joint(&self, _effect: &Effect, _joint: &mut JointTerms) -> bool {
         false
     }

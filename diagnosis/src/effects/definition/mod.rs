@@ -1,5 +1,5 @@
-//! The definition of an effect, in a trait each for its law, for the search and for the report. A file
-//! of `effects` defines each effect. Nothing here may know how an effect is found.
+//! The definition of an effect, in a trait each for its law, for the search and for the report. A
+//! file of `effects` defines each effect. Nothing here may know how an effect is found.
 
 mod law;
 mod report;

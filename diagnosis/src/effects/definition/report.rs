@@ -12,7 +12,8 @@ pub(crate) struct Fitted<'a> {
     pub(crate) common: f64,
     /// Gain over inertia.
     pub(crate) ratio: f64,
-    /// Viscous and dry friction per inertia, by the rig's own terms or another effect's, and the rig's own dry friction.
+    /// Viscous and dry friction per inertia, by the rig's own terms or another effect's, and the
+    /// rig's own dry friction.
     pub(crate) viscous: Option<f64>,
     pub(crate) dry: Option<f64>,
     pub(crate) own_dry: f64,
@@ -46,7 +47,8 @@ impl Fitted<'_> {
         self.terms.get(k).copied().unwrap_or((0.0, 0.0))
     }
 
-    /// A force: the coefficient times the inertia, whose scale is known no better than the rig says.
+    /// A force: the coefficient times the inertia, whose scale is known no better than the rig
+    /// says.
     pub(crate) fn scaled(&self, (x, sd): (f64, f64)) -> (f64, f64) {
         let value = x * self.inertia;
         (value, ((sd * self.inertia).powi(2) + (value * self.common).powi(2)).sqrt())
@@ -83,10 +85,15 @@ pub(crate) trait EffectReport {
     /// The values that are reported.
     fn report(&self, fitted: &Fitted) -> Vec<Reported>;
 
-    /// Relative standard deviation of a reported value for the form of the law alone: the machine's law is never quite ours,
-    /// and an interval that only noise makes is too narrow.
+    /// Relative standard deviation of a reported value for the form of the law alone: the machine's
+    /// law is never quite ours, and an interval that only noise makes is too narrow.
     fn form_sd(&self, _value: &str) -> f64 {
         0.005
+    }
+
+    /// True if a reported value is a size, and does not say where or when the effect acts.
+    fn is_size(&self, value: &str) -> bool {
+        !value.starts_with("period")
     }
 
     /// The variable over which it shows: `speed`, `travel`, `angle`, `command`, `time` or `tilt`.
@@ -94,7 +101,8 @@ pub(crate) trait EffectReport {
         "speed"
     }
 
-    /// Returns the recording that distinguishes it from `other`; none where `other` has one, or none is known.
+    /// Returns the recording that distinguishes it from `other`; none where `other` has one, or
+    /// none is known.
     fn experiment(&self, _other: EffectName) -> Option<&'static str> {
         None
     }

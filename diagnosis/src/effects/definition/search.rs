@@ -1,11 +1,14 @@
-//! The description of an effect for the search: its shapes, their bounds, and what it may be confused with.
+//! The description of an effect for the search: its shapes, their bounds, and what it may be
+//! confused with.
 
 use crate::effects::{Effect, EffectName};
 
-/// The range of the recordings and the rig's statement of the machine: a grid of shapes depends on nothing else.
+/// The range of the recordings and the rig's statement of the machine: a grid of shapes depends on
+/// nothing else.
 #[derive(Debug, Clone)]
 pub(crate) struct Span {
-    /// Speed that 99 % of the blocks stay below, and the floor under which its sign is unknown, rad/s or m/s.
+    /// Speed that 99 % of the blocks stay below, and the floor under which its sign is unknown,
+    /// rad/s or m/s.
     pub(crate) speed: f64,
     pub(crate) speed_floor: f64,
     /// Speed that a twelfth of the moving blocks stay below.
@@ -23,8 +26,8 @@ pub(crate) struct Span {
     pub(crate) block: f64,
     /// One count.
     pub(crate) count: f64,
-    /// Smallest part of the largest command at which a drive may clip. Where the inertia is hardly known, a drive that
-    /// clips at little explains slow motion as well as forces in balance do.
+    /// Smallest part of the largest command at which a drive may clip. Where the inertia is hardly
+    /// known, a drive that clips at little explains slow motion as well as forces in balance do.
     pub(crate) clip: f64,
     /// Largest command that may do nothing.
     pub(crate) dead: f64,
@@ -67,7 +70,8 @@ impl Span {
 /// Sizes that the rig allows an effect, per inertia.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Allowed {
-    /// Gain over inertia as far as it is known, the factor by which the truth may differ, and whether force has told it.
+    /// Gain over inertia as far as it is known, the factor by which the truth may differ, and
+    /// whether force has told it.
     pub(crate) gain: f64,
     pub(crate) gain_reach: f64,
     pub(crate) is_anchored: bool,
@@ -83,10 +87,11 @@ pub(crate) const FREE: (f64, f64) = (f64::NEG_INFINITY, f64::INFINITY);
 /// Anything not below zero.
 pub(crate) const POSITIVE: (f64, f64) = (0.0, f64::INFINITY);
 
-/// Limits of the recordings that decide whether twins can be told apart.
+/// Limits of the recordings that decide whether twins can be distinguished.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Shown {
-    /// True if all motion is at one speed, in strokes of one length, within less than a turn, and along a line.
+    /// True if all motion is at one speed, in strokes of one length, within less than a turn, and
+    /// along a line.
     pub(crate) one_speed: bool,
     pub(crate) one_length: bool,
     pub(crate) less_than_a_turn: bool,
@@ -106,7 +111,8 @@ pub(crate) struct Plain {
     pub(crate) has_twin: bool,
 }
 
-/// Physics without a name in the library, of the law of an effect: nothing of it is named, it speaks only against names.
+/// Physics without a name in the library, of the law of an effect: nothing of it is named, it
+/// speaks only against names.
 pub(crate) struct Unnamed {
     /// The law with the shape that makes it such.
     pub(crate) effect: Effect,
@@ -129,9 +135,16 @@ pub(crate) trait EffectSearch {
         false
     }
 
-    /// True if it does not show in motion whose inertia hardly matters: a joint, or the gain, which is then the scale of all else.
+    /// True if it does not show in motion whose inertia hardly matters: a joint, or the gain, which
+    /// is then the scale of all else.
     fn needs_inertia(&self) -> bool {
         false
+    }
+
+    /// Returns the number of values of a finer profile along the travel, by which shapes of a grid
+    /// differ; 0 if they do not.
+    fn profile_values(&self, _effect: &Effect) -> f64 {
+        0.0
     }
 
     /// False for a force without a name, which is no hypothesis.
@@ -144,7 +157,8 @@ pub(crate) trait EffectSearch {
         false
     }
 
-    /// Returns how any machine may have it; none if not. Such forces are looked for together, before anything else.
+    /// Returns how any machine may have it; none if not. Such forces are looked for together,
+    /// before anything else.
     fn plain(&self, _effect: &Effect) -> Option<Plain> {
         None
     }
@@ -154,13 +168,14 @@ pub(crate) trait EffectSearch {
         true
     }
 
-    /// True if it bends to the little that any model leaves next to reversals, and so gains a little on recordings in which
-    /// there is nothing.
+    /// True if it bends to the little that any model leaves next to reversals, and so gains a
+    /// little on recordings in which there is nothing.
     fn bends_at_reversals(&self) -> bool {
         false
     }
 
-    /// Travel over which it gives way after a reversal before it holds, rad or m, where it does and that should be short.
+    /// Travel over which it gives way after a reversal before it holds, rad or m, where it does and
+    /// that should be short.
     fn gives_way_over(&self, _effect: &Effect) -> Option<f64> {
         None
     }
@@ -178,8 +193,8 @@ pub(crate) trait EffectSearch {
         false
     }
 
-    /// Factors on values of the shape that go together, to look elsewhere for the optimum of an effect that is built on the
-    /// rest of the machine.
+    /// Factors on values of the shape that go together, to look elsewhere for the optimum of an
+    /// effect that is built on the rest of the machine.
     fn start_factors(&self) -> &'static [Factors] {
         &[]
     }
@@ -189,12 +204,13 @@ pub(crate) trait EffectSearch {
         true
     }
 
-    /// Returns the bounds of a term's coefficient, per inertia, within which the effect is what its name says.
+    /// Returns the bounds of a term's coefficient, per inertia, within which the effect is what its
+    /// name says.
     fn limits(&self, _term: usize, _allowed: &Allowed) -> (f64, f64) {
         FREE
     }
 
-    /// True if it is in doubt where the coefficient of a term stands at its limit.
+    /// True if it is in doubt where the coefficient of a term is at its limit.
     fn is_in_doubt_at_limit(&self, _term: usize) -> bool {
         true
     }
@@ -209,8 +225,8 @@ pub(crate) trait EffectSearch {
         Vec::new()
     }
 
-    /// Physics without a name that its law may also be: what may look like `fitted`, an effect of any name, or all there is
-    /// where nothing is fitted. `name` is its own.
+    /// Physics without a name that its law may also be: what may look like `fitted`, an effect of
+    /// any name, or all there is where nothing is fitted. `name` is its own.
     fn unnamed(&self, _name: EffectName, _fitted: Option<&Effect>, _span: &Span) -> Vec<Unnamed> {
         Vec::new()
     }

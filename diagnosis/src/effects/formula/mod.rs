@@ -1,9 +1,10 @@
-//! Effects of a user's own: a formula of `v, q, u, t, tilt` and named parameters with bounds, read from TOML and then searched,
-//! named, patched and simulated as the built-in ones are.
+//! Effects of a user's own: a formula of `v, q, u, t, tilt` and named parameters with bounds, read
+//! from TOML and then searched, named, patched and simulated as the built-in ones are.
 //!
-//! A formula is the force that it adds to the right-hand side, in N·m or N. Parameters that it is linear in become coefficients
-//! of terms; the others are shape values, which are searched between their bounds. What a formula is called is known to the
-//! whole program once it is read, because names of effects are compared everywhere.
+//! A formula is the force that it adds to the right-hand side, in N·m or N. Parameters that it is
+//! linear in become coefficients of terms; the others are shape values, which are searched between
+//! their bounds. What a formula is called is known to the whole program once it is read, because
+//! names of effects are compared everywhere.
 
 mod as_effect;
 mod file;
@@ -16,7 +17,8 @@ use std::sync::RwLock;
 
 pub(crate) use file::read_effects;
 
-/// The variables of a formula: speed, position from the start of the recording, command, time from its start, tilt.
+/// The variables of a formula: speed, position from the start of the recording, command, time from
+/// its start, tilt.
 const VARIABLES: [&str; 5] = ["v", "q", "u", "t", "tilt"];
 
 /// A formula as a file has it.
@@ -83,7 +85,7 @@ pub(super) fn find(name: &str) -> Option<EffectName> {
     u16::try_from(at).ok().map(|at| EffectName::Formula(FormulaId(at)))
 }
 
-/// Numbers that are no one's in particular, for trying a formula.
+/// Arbitrary numbers, for trying a formula.
 fn trials(count: usize) -> impl Iterator<Item = f64> {
     (1..=count).map(|k| (k as f64 * 0.754_877_666).fract())
 }
@@ -249,7 +251,8 @@ impl Formula {
             };
         for candidate in 0..self.shape.len() {
             let together: Vec<usize> = chosen.iter().copied().chain([candidate]).collect();
-            // Twice and three times all of them together must be twice and three times the force above that without them.
+            // Twice and three times all of them together must be twice and three times the force
+            // above that without them.
             let is_linear = samples.iter().all(|sample| {
                 let mut with = |factor: f64| {
                     let set: Vec<(usize, f64)> =

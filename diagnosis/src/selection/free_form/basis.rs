@@ -1,5 +1,6 @@
-//! Fixed bases for forces of any form: cosines over variables made dimensionless, so that a Gaussian process is a linear
-//! regression with a prior (Solin and Särkkä 2020, doi 10.1007/s11222-019-09886-w). Nothing here is fitted.
+//! Fixed bases for forces of any form: cosines over variables made dimensionless, so that a
+//! Gaussian process is a linear regression with a prior (Solin and Särkkä 2020, doi
+//! 10.1007/s11222-019-09886-w). Nothing here is fitted.
 
 use crate::effects::Variable;
 use crate::estimation::blocked_recording::BlockedRecording;
@@ -63,7 +64,8 @@ impl Inputs {
         matches!(self, Self::Angle | Self::AngleCommand)
     }
 
-    /// True if the form is a part of the command's own force, rather than any force over the command.
+    /// True if the form is a part of the command's own force, rather than any force over the
+    /// command.
     fn scales_command(self) -> bool {
         matches!(self, Self::TimeCommand | Self::TravelCommand | Self::AngleCommand)
     }
@@ -108,7 +110,8 @@ pub(crate) fn points(track: &BlockedRecording) -> Vec<Point> {
         .collect()
 }
 
-/// A variable from 0 to 1: half by its range, half by its rank, so that the form may be finer where the axis is often.
+/// A variable from 0 to 1: half by its range, half by its rank, so that the form may be finer where
+/// the axis is often.
 #[derive(Debug, Clone)]
 pub(crate) struct Warp {
     quantiles: Vec<f64>,

@@ -16,7 +16,8 @@ pub(crate) struct Gain {
     pub(crate) sum: f64,
     /// Its standard error, nats.
     pub(crate) error: f64,
-    /// Standard errors of the mean where each unit counts up to a limit: one with a huge gain is one witness.
+    /// Standard errors of the mean where each unit counts up to a limit: one with a huge gain is
+    /// one witness.
     steady: f64,
 }
 
@@ -44,7 +45,8 @@ impl Gain {
         self.sum > 0.0 && self.z() > FORM_SURE_Z
     }
 
-    /// Returns the standard errors above zero, with or without a limit on what a unit counts, whichever is more.
+    /// Returns the standard errors above zero, with or without a limit on what a unit counts,
+    /// whichever is more.
     pub(crate) fn z(&self) -> f64 {
         (self.sum / self.error.max(1e-300)).max(self.steady)
     }
@@ -89,8 +91,9 @@ impl Densities {
         all
     }
 
-    /// Compares an effect, a force of `variable` alone if given, with the forms, given the densities of the model without it. A form
-    /// of that variable and of another one has every such law in it, so that none takes anything beyond: it says nothing.
+    /// Compares an effect, a force of `variable` alone if given, with the forms, given the
+    /// densities of the model without it. A form of that variable and of another one has every such
+    /// law in it, so that none takes anything beyond: it says nothing.
     pub(crate) fn standing(&self, without: &Self, variable: Option<Variable>) -> Standing {
         let own = self.alone.over(&without.alone);
         let contains = |inputs: &Inputs| {
@@ -128,14 +131,16 @@ mod tests {
 
     const UNITS: usize = 40;
 
-    /// Densities of a model with one form: what model and form take together and alone over nothing, nats per unit.
+    /// Densities of a model with one form: what model and form take together and alone over
+    /// nothing, nats per unit.
     fn densities(alone: f64, with: f64) -> Densities {
         // A little scatter, as no two units are alike.
         let of = |sum: f64| Density((0..UNITS).map(|i| sum * (1.0 + 0.3 * (i as f64).sin())).collect());
         Densities { alone: of(alone), with: vec![(Inputs::Speed, of(with))] }
     }
 
-    /// True if an effect stands that takes `own` where the form takes `form` and both together `both`.
+    /// True if an effect holds that takes `own` where the form takes `form` and both together
+    /// `both`.
     fn stands(own: f64, form: f64, both: f64) -> bool {
         densities(own, both).standing(&densities(0.0, form), None).against.is_none()
     }
@@ -148,7 +153,8 @@ mod tests {
         assert!(!stands(-300.0, 20.0, -10.0), "it takes nothing");
     }
 
-    /// As of EMPS, where friction differs with direction and more is left that a form over speed and time since reversal takes.
+    /// As of EMPS, where friction differs with direction and more is left that a form over speed
+    /// and time since reversal takes.
     #[test]
     fn a_form_that_has_every_law_of_its_kind_in_it_denies_none() {
         let over = |alone: f64, with: f64| {

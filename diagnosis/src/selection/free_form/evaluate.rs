@@ -1,4 +1,5 @@
-//! Models with and without free forms, fitted with some blocks left out, by their normal equations alone.
+//! Models with and without free forms, fitted with some blocks left out, by their normal equations
+//! alone.
 
 use super::basis::{self, Basis, Inputs, Point, Warps};
 use super::compare::{Densities, Density};
@@ -115,7 +116,8 @@ pub(crate) struct Evaluator<'a> {
     forms: Vec<Form>,
 }
 
-/// Sizes of a free form over the acceleration that the command makes, and its length over the range of its inputs.
+/// Sizes of a free form over the acceleration that the command makes, and its length over the range
+/// of its inputs.
 const SIZES: [f64; 5] = [0.0004, 0.003, 0.02, 0.1, 0.5];
 const LENGTHS: [f64; 3] = [0.1, 0.3, 1.0];
 
@@ -296,8 +298,8 @@ impl Evaluator<'_> {
         Normal::new(self, &base, None).density(&base.precision)
     }
 
-    /// The force of a form beside a model, fitted to all blocks; of an angle, as in the first recording. `inertia` makes
-    /// force of acceleration.
+    /// The force of a form beside a model, fitted to all blocks; of an angle, as in the first
+    /// recording. `inertia` makes force of acceleration.
     pub(crate) fn shape(&self, model: &Model, inputs: Inputs, inertia: f64) -> Option<Shape> {
         let form = self.forms.iter().find(|form| form.inputs == inputs && !form.frequency.is_empty())?;
         let base = self.base(model);
@@ -320,7 +322,8 @@ impl Evaluator<'_> {
         Some(Shape::new(&basis, &of, &self.points, self.nominal.known_gain(), inertia))
     }
 
-    /// Precisions of the priors of all columns, of the size and length of a form with the largest marginal likelihood.
+    /// Precisions of the priors of all columns, of the size and length of a form with the largest
+    /// marginal likelihood.
     fn most_likely(&self, form: &Form, base: &Base, normal: &Normal) -> Vec<f64> {
         let (whole, b) = normal.sum(None);
         let mut best = (f64::NEG_INFINITY, Vec::new());

@@ -1,4 +1,5 @@
-//! A fitted free form as people see it and as the simulator runs it: its force over a grid, with a band.
+//! A fitted free form as people see it and as the simulator runs it: its force over a grid, with a
+//! band.
 
 use super::basis::{Basis, Inputs, Point, Warp, Warps};
 use crate::effects::{Table, Variable};
@@ -14,11 +15,12 @@ pub(crate) struct Shape {
     pub(crate) visits: Vec<f64>,
 }
 
-/// Places of a variable that stands alone, of one of two, and of an angle.
+/// Places of a variable that is alone, of one of two, and of an angle.
 const ALONE: usize = 33;
 const OF_TWO: usize = 15;
 const OF_TURN: usize = 241;
-/// Largest command of a table over the command, over the largest in the recordings: the force is in proportion.
+/// Largest command of a table over the command, over the largest in the recordings: the force is in
+/// proportion.
 const BEYOND: f64 = 1.5;
 
 /// Coefficients of a form's columns with their covariance, accelerations.
@@ -88,7 +90,8 @@ fn nearest(grid: &[f64], value: f64) -> usize {
 }
 
 impl Shape {
-    /// The force of a form; `gain` is the acceleration per unit of the command, `inertia` makes force of acceleration.
+    /// The force of a form; `gain` is the acceleration per unit of the command, `inertia` makes
+    /// force of acceleration.
     pub(super) fn new(
         basis: &Basis,
         of: &Coefficients,

@@ -5,7 +5,8 @@ use super::sight::Sight;
 use crate::numerics::linear::{Prior, Square, bounded, dot};
 use crate::selection::predictive::FOLDS;
 
-/// Number of correlated rows that carry as much information as one independent row; the priors are weighed accordingly.
+/// Number of correlated rows that carry as much information as one independent row; the priors are
+/// weighed accordingly.
 const TOGETHER: f64 = 10.0;
 
 /// One recording: inner products of its columns, target last, per fold.
@@ -97,7 +98,8 @@ impl Design {
         Self { all, priors, laws: places_of }
     }
 
-    /// The coefficients that fit the folds that count best; `square` is the mean square that is left.
+    /// The coefficients that fit the folds that count best; `square` is the mean square that is
+    /// left.
     pub(crate) fn solve(&self, square: f64, counts: impl Fn(usize) -> bool) -> Vec<f64> {
         let size = self.priors.len();
         let (mut m, mut b) = (Square::zero(size), vec![0.0; size]);
@@ -159,8 +161,8 @@ fn add(a: (f64, f64), b: (f64, f64)) -> (f64, f64) {
     (a.0 + b.0, a.1 + b.1)
 }
 
-/// Mean square that is left on held-out recordings by coefficients found on the fitted ones: the phase of a law that has its own
-/// in every recording is found there, its amplitude is not.
+/// Mean square that is left on held-out recordings by coefficients found on the fitted ones: the
+/// phase of a law that has its own in every recording is found there, its amplitude is not.
 pub(crate) fn held_out(fitted: &Design, x: &[f64], there: &Design, square: f64, laws: &[&Columns]) -> f64 {
     let nominal = there.laws.first().map_or(there.priors.len(), |of| of[0][0]);
     let own = there.solve(square, |_| true);

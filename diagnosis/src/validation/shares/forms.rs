@@ -7,12 +7,13 @@ use crate::effects::definition::FREE;
 use crate::estimation::nominal::Nominal;
 use crate::selection::free_form::{Basis, Inputs, Warps, points};
 
-/// The forms that are tried: those of the command hold the very disturbance that is to be explained.
+/// The forms that are tried: those of the command hold the very disturbance that is to be
+/// explained.
 const FORMS: [Inputs; 5] =
     [Inputs::Speed, Inputs::Travel, Inputs::TravelSpeed, Inputs::SinceReversalSpeed, Inputs::TimeSpeed];
 
-/// Returns the columns of forms; each coefficient is about `sd`, N·m or N. `instead` is the effect in whose place they stand,
-/// `fits` how many of the recordings are fitted.
+/// Returns the columns of forms; each coefficient is about `sd`, N·m or N. `instead` is the effect
+/// in whose place they stand, `fits` how many of the recordings are fitted.
 pub(crate) fn forms<'a>(
     sights: &'a [Sight],
     fits: usize,

@@ -76,13 +76,14 @@ pub(crate) fn columns(
         });
     }
     // A loss in proportion to the recorded command would shrink what it is to explain.
-    let rests_on_command = is_by_command(effect) || effect.value("of_drive") > 0.5;
+    let rests_on_command = is_by_command(effect) || effect.name.definition().follows_drive(effect);
     let with_asked = rests_on_command.then(|| asked.tracks(sights, scale));
     let track = |r: usize| with_asked.map_or(sights[r].track, |tracks| &tracks[r]);
     let inputs: Vec<Vec<Input>> = (0..sights.len()).map(|r| inputs_of(effect, track(r))).collect();
     let all = || sights.iter().zip(&inputs);
     if all().all(|(sight, inputs)| inputs.iter().all(|input| sight.is_constant(input))) {
-        // Dry friction on an axis that runs one way is a constant, as is each recording's own offset.
+        // Dry friction on an axis that runs one way is a constant, as is each recording's own
+        // offset.
         return None;
     }
     let of: Vec<Vec<Vec<f64>>> = all().map(|(sight, inputs)| seen(effect, sight, inputs)).collect();
@@ -94,7 +95,8 @@ pub(crate) fn columns(
     Some(Columns { effect: effect.clone(), of, own: definition.has_own_phase(), bounds, sd: f64::INFINITY })
 }
 
-/// Bounds of a term, as a force. A law that may have either sign is not held to what the rig says of friction or gain: shares judge it.
+/// Bounds of a term, as a force. A law that may have either sign is not held to what the rig says
+/// of friction or gain: shares judge it.
 fn bounds(effect: &Effect, term: usize, nominal: &Nominal, scale: Scale) -> (f64, f64) {
     let (low, high) = nominal.limits(effect.name, term);
     if low < 0.0 && high > 0.0 {
@@ -164,7 +166,8 @@ mod tests {
     use crate::io::recording::Recording;
     use crate::io::rig::Rig;
 
-    /// The columns of an effect on an axis that swings while it advances with a mean speed, counts/s, on which the motion asks for one force.
+    /// The columns of an effect on an axis that swings while it advances with a mean speed,
+    /// counts/s, on which the motion asks for one force.
     fn of_axis(effect: &Effect, advances: f64, asked: f64) -> Option<Columns> {
         let time_s: Vec<f64> = (0..6000).map(|row| f64::from(row) * 1e-3).collect();
         let counts = |t: &f64| (9000.0 * (3.0 * t).sin() + advances * t).round();

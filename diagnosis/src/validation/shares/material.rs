@@ -3,7 +3,8 @@
 use crate::effects::EffectName;
 use crate::thresholds::{CLAIMED, SHARE_ODDS};
 
-/// An effect that takes a material part of the force error, on fitted and on held-out recordings, ahead of its rivals.
+/// An effect that takes a material part of the force error, on fitted and on held-out recordings,
+/// ahead of its rivals.
 #[derive(Clone, Debug)]
 pub(crate) struct Material {
     pub(crate) name: EffectName,

@@ -15,7 +15,8 @@ use crate::validation::out_of_library::unnamed_like;
 /// Additional share that a rival must take to replace an effect.
 const SURELY: f64 = 0.01;
 
-/// Part of what a law leaves by which a plain friction, which any rig may have, may leave more and still go before it.
+/// Part of what a law leaves by which a plain friction, which any rig may have, may leave more and
+/// still go before it.
 const PLAIN_LEAVES: f64 = 0.3;
 
 /// An effect that was selected, and the others that could take its place.
@@ -45,7 +46,8 @@ impl Selected {
 }
 
 impl Selection<'_> {
-    /// Laws that take `least` of the force error, from nothing or from what was found, whichever leaves less.
+    /// Laws that take `least` of the force error, from nothing or from what was found, whichever
+    /// leaves less.
     pub(crate) fn grown(&self, least: f64, found: &[Effect]) -> Vec<Columns> {
         let first = State::new(self, Vec::new());
         let known = found
@@ -73,7 +75,8 @@ impl Selection<'_> {
         }
     }
 
-    /// Geometric mean of what laws leave on folds of the fitted recordings and on held-out ones, root mean square.
+    /// Geometric mean of what laws leave on folds of the fitted recordings and on held-out ones,
+    /// root mean square.
     fn left(&self, laws: &[Columns]) -> f64 {
         let (fit, holdout) = State::new(self, laws.iter().collect()).left;
         (fit.sqrt() * holdout.sqrt()).sqrt()
@@ -142,8 +145,9 @@ impl Selection<'_> {
         effects.iter().all(|effect| columns(effect, &self.sights, nominal, &first.asked).is_some())
     }
 
-    /// Root mean square that effects leave over what others leave, on folds of the fitted recordings or on held-out ones, whichever is
-    /// more; none where a regression has no law of one of them.
+    /// Root mean square that effects leave over what others leave, on folds of the fitted
+    /// recordings or on held-out ones, whichever is more; none where a regression has no law of one
+    /// of them.
     pub(crate) fn leaves_over(&self, effects: &[&Effect], others: &[&Effect]) -> Option<f64> {
         let first = State::new(self, Vec::new());
         let of = |effect: &&Effect| columns(effect, &self.sights, self.context.nominal, &first.asked);
@@ -178,8 +182,9 @@ impl Selection<'_> {
         (1.0 - best) / (1.0 - share.least()).max(1e-6)
     }
 
-    /// The largest share that physics without a name takes in the place of a drift: a load that changes at once looks like one. Zero for
-    /// other laws. Friction in proportion to the drive's force takes nearly all that any friction takes, so it says nothing here.
+    /// The largest share that physics without a name takes in the place of a drift: a load that
+    /// changes at once looks like one. Zero for other laws. Friction in proportion to the drive's
+    /// force takes nearly all that any friction takes, so it says nothing here.
     fn unnamed_in_place_of(&self, taken: &[Columns], i: usize) -> f64 {
         let (nominal, effect) = (self.context.nominal, &taken[i].effect);
         if !effect.name.definition().drifts() {
@@ -219,7 +224,8 @@ impl Selection<'_> {
     }
 }
 
-/// True if a rival surely takes more than a law does, or is a plain friction that takes enough by itself and leaves little more.
+/// True if a rival surely takes more than a law does, or is a plain friction that takes enough by
+/// itself and leaves little more.
 fn goes_before(rival: &Share, law: &Share) -> bool {
     let is_plainer = is_plain(rival.effect.name) && !is_plain(law.effect.name);
     let most = (1.0 - law.least()) * (1.0 + PLAIN_LEAVES);

@@ -7,7 +7,8 @@ use crate::thresholds::SAME_SIZE_OF_SHARE;
 #[derive(Clone, Debug)]
 pub(crate) struct Share {
     pub(crate) effect: Effect,
-    /// Parts of the force error, root mean square, that it takes on stretches left out of the fit and on held-out recordings.
+    /// Parts of the force error, root mean square, that it takes on stretches left out of the fit
+    /// and on held-out recordings.
     pub(crate) on_fit: f64,
     pub(crate) on_holdout: f64,
     /// Its size on the held-out recordings over that on the fitted ones.
@@ -17,7 +18,8 @@ pub(crate) struct Share {
 }
 
 impl Share {
-    /// True if it is about as large on held-out recordings as on fitted ones, and is not what it is only by a limit.
+    /// True if it is about as large on held-out recordings as on fitted ones, and is not what it is
+    /// only by a limit.
     pub(crate) fn fits(&self) -> bool {
         !self.at_bound && SAME_SIZE_OF_SHARE.contains(&self.size)
     }

@@ -1,4 +1,5 @@
-//! One recording as a regression sees it: the drive's force and the columns of the motion in one band, at blocks that move.
+//! One recording as a regression sees it: the drive's force and the columns of the motion in one
+//! band, at blocks that move.
 
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::filter::Noise;
@@ -156,7 +157,8 @@ impl<'a> Sight<'a> {
         self.kept.iter().map(|j| with[*j] - self.acceleration[*j]).collect()
     }
 
-    /// A column of blocks in the band at the kept rows, its mean taken off: an offset is each recording's own.
+    /// A column of blocks in the band at the kept rows, its mean taken off: an offset is each
+    /// recording's own.
     pub(crate) fn see(&self, column: &[f64]) -> Vec<f64> {
         self.centred(self.kept.iter().map(|j| self.at(column, *j)).collect())
     }
@@ -173,7 +175,8 @@ impl<'a> Sight<'a> {
         column.into_iter().map(|x| x - mean).collect()
     }
 
-    /// The drive's force that the motion asks for by the nominal terms, block by block in the band; `force` is that of laws.
+    /// The drive's force that the motion asks for by the nominal terms, block by block in the band;
+    /// `force` is that of laws.
     pub(crate) fn asked(&self, coefficients: &[f64], force: &[f64]) -> Vec<f64> {
         let mut sum: Vec<f64> = force.to_vec();
         for (c, column) in coefficients[1..].iter().zip(&self.unseen) {

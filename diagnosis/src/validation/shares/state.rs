@@ -70,7 +70,7 @@ pub(super) struct State<'a> {
 impl<'a> State<'a> {
     pub(super) fn new(on: &'a Selection<'a>, laws: Vec<&'a Columns>) -> Self {
         let (fitted, there) = on.designs(&laws);
-        // Once with a guess of what is left, and again with that.
+        // Once with a guess of the residual, and again with that.
         let guess = fitted.left_by(&fitted.solve(0.01 * fitted.target(), |_| true));
         let x = fitted.solve(guess, |_| true);
         let square = fitted.left_by(&x);
@@ -142,7 +142,8 @@ impl<'a> State<'a> {
         columns(effect, &self.on.sights, self.on.context.nominal, &self.asked)
     }
 
-    /// The shape of an effect that takes most on stretches left out of the fit; none for a joint, whose shape only the search finds.
+    /// The shape of an effect that takes most on stretches left out of the fit; none for a joint,
+    /// whose shape only the search finds.
     fn best_shape(&self, name: N) -> Option<Columns> {
         let on = self.on;
         if name.definition().coupling().is_some() {
@@ -201,7 +202,7 @@ fn size(fitted: &Design, x: &[f64], there: &Design, own: &[f64], law: usize, has
     there.along(law, &carried, own) / there.along(law, &carried, &carried).max(1e-300)
 }
 
-/// True if a coefficient of a law is at one of its bounds; zero is none.
+/// True if a coefficient of a law is at one of its bounds; zero does not count as one.
 fn is_at_bound(design: &Design, x: &[f64], law: usize, bounds: &[(f64, f64)]) -> bool {
     let is_at = |x: f64, bound: f64| bound.is_finite() && bound != 0.0 && (x / bound - 1.0).abs() < 1e-6;
     let places = design.laws[law].iter();

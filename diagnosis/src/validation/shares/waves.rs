@@ -1,10 +1,11 @@
-//! The waves of an effect that repeats along the travel: those that stand out under the noise, and the whole orders of a known turn
-//! by their own shares, since other physics may hide them from a likelihood.
+//! The waves of an effect that repeats along the travel: those that stand out under the noise, and
+//! the whole orders of a known turn by their own shares, since other physics may hide them from a
+//! likelihood.
 
 use super::laws::Columns;
 use super::state::State;
 use crate::effects::{Effect, EffectName as N};
-use crate::selection::periodic::{are_apart, fits, of_orders};
+use crate::selection::periodic::{are_apart, fits};
 
 /// Orders of a turn that are tried.
 const ORDERS: usize = 24;
@@ -17,7 +18,8 @@ const FURTHER: f64 = 0.02;
 type Tried = (f64, Columns);
 
 impl State<'_> {
-    /// The waves that take most on stretches left out of the fit, as those of one effect; `found` stand out under the noise.
+    /// The waves that take most on stretches left out of the fit, as those of one effect; `found`
+    /// stand out under the noise.
     pub(super) fn best_waves(&self, name: N, found: &[Effect]) -> Option<Columns> {
         let standing = found.iter().filter_map(|one| self.tried(Effect { name, ..one.clone() }));
         let best = standing.chain(self.best_orders(name)).max_by(|a, b| a.0.total_cmp(&b.0));
@@ -29,7 +31,8 @@ impl State<'_> {
         Some((self.on_fit(&columns), columns))
     }
 
-    /// The whole orders of the turn that take most together, one after another; none where the turn is not known.
+    /// The whole orders of the turn that take most together, one after another; none where the turn
+    /// is not known.
     fn best_orders(&self, name: N) -> Option<Tried> {
         let span = self.on.context.span;
         let turn = span.rig.turn?;
@@ -38,7 +41,7 @@ impl State<'_> {
             fits(*order, span.travel() / turn) && is_in_band
         };
         let orders = (1..=ORDERS).map(|order| order as f64).filter(is_seen);
-        let alone = |order: f64| Some((order, self.tried(of_orders(name, turn, &[order]))?));
+        let alone = |order: f64| Some((order, self.tried(Effect::of_orders(name, turn, &[order]))?));
         let mut ranked: Vec<(f64, Tried)> = orders.filter_map(alone).collect();
         ranked.sort_by(|a, b| b.1.0.total_cmp(&a.1.0));
         ranked.truncate(TOGETHER.0);
@@ -53,7 +56,7 @@ impl State<'_> {
                 continue;
             }
             let with: Vec<f64> = taken.iter().copied().chain([order]).collect();
-            let Some(more) = self.tried(of_orders(name, turn, &with)) else { continue };
+            let Some(more) = self.tried(Effect::of_orders(name, turn, &with)) else { continue };
             if more.0 > best.0 + FURTHER {
                 (best, taken) = (more, with);
             }

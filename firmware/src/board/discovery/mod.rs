@@ -15,7 +15,7 @@
 //! | PB1 | to 3 V: an analogue inclinometer is fitted | pulled down inside; read at start-up |
 //! | PC1 | analogue inclinometer (ADC 1, channel 11) | free on the board |
 //! | PA11, PA12 | USB | the micro-USB connector CN5 |
-//! | PC0 | power switch of CN5, for a host; low is on | high for good: this is a device (UM1472, OTG) |
+//! | PC0 | power switch of CN5, for a host; low is on | always high: this is a device (UM1472, OTG) |
 //! | PD12, PD13, PD14 | lamps: green, running; orange, torque is on; red, a fault | LD4, LD3, LD5 on the board |
 
 use crate::chip::{
@@ -40,8 +40,8 @@ impl Wiring for Discovery {
     type Enable = PD7<Output>;
     type Tilt = BoardTilt;
 
-    /// 10 N at a roller of 10 mm, the most that Paper 002 asks for, and 0.6 m/s, half as fast again as the overspeed trip of a usual
-    /// encoder. Another motor is another image.
+    /// 10 N at a roller of 10 mm, the most that Paper 002 asks for, and 0.6 m/s, half as fast again
+    /// as the overspeed trip of a usual encoder. Another motor is another image.
     const CEILINGS: Ceilings = Ceilings::new(100, 600);
 
     fn init(

@@ -1,6 +1,7 @@
-//! NUCLEO-F429ZI (MB1137, STM32F429ZI). No accelerometer is on it: an analogue inclinometer has to be fitted. Connector and pin as in
-//! UM1974, section 6.12. Left alone, for the board uses them: Ethernet (PA1, PA2, PA7, PB13, PC1, PC4, PC5, PG11, PG13), the debugger's
-//! serial port (PD8, PD9), the button (PC13).
+//! NUCLEO-F429ZI (MB1137, STM32F429ZI). No accelerometer is on it: an analogue inclinometer has to
+//! be fitted. Connector and pin as in UM1974, section 6.12. Left alone, for the board uses them:
+//! Ethernet (PA1, PA2, PA7, PB13, PC1, PC4, PC5, PG11, PG13), the debugger's serial port (PD8,
+//! PD9), the button (PC13).
 //!
 //! | pin | does | remark |
 //! | --- | --- | --- |
@@ -43,7 +44,8 @@ impl Wiring for NucleoF429zi {
         device: pac::Peripherals,
         statics: &'static mut Statics,
     ) -> Parts<Self> {
-        // 8 MHz from the debugger's own microcontroller, which has to have power (UM1974, HSE clock).
+        // 8 MHz from the debugger's own microcontroller, which has to have power (UM1974, HSE
+        // clock).
         let mut begun = Begun::new(device.RCC, Source::Bypass);
         let rcc = &mut begun.rcc;
         let gpioa = device.GPIOA.split(rcc);
@@ -69,7 +71,8 @@ impl Wiring for NucleoF429zi {
             (device.ADC2, gpioc.pc2.into_analog()),
             rcc,
         );
-        // PA15 and PB3 are the debugger's JTDI and JTDO out of reset (RM0090 8.3.2); from here on they are the timer's.
+        // PA15 and PB3 are the debugger's JTDI and JTDO out of reset (RM0090 8.3.2); from here on
+        // they are the timer's.
         let tracks = (gpioa.pa15.into_pull_up_input(), gpiob.pb3.into_pull_up_input());
         let encoder = chip::encoder(device.TIM2, tracks, gpioe.pe7, rcc);
         gpiog.pg6.into_push_pull_output().set_low();

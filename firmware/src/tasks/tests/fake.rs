@@ -25,7 +25,8 @@ use std::collections::VecDeque;
 use std::thread_local;
 use std::vec::Vec;
 
-/// The state of the board that a test sets and sees; each test has a thread, and so a board, of its own.
+/// The state of the board that a test sets and sees; each test has a thread, and so a board, of its
+/// own.
 #[derive(Default)]
 pub(super) struct World {
     pub(super) cycles: Cell<u32>,

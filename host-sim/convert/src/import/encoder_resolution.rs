@@ -50,7 +50,8 @@ fn step(column: &[f64]) -> Option<f64> {
         .then_some(step)
 }
 
-/// The scale for runs of one recording session. `per_unit` is what was said, in counts per rad or m.
+/// The scale for runs of one recording session. `per_unit` is what was said, in counts per rad or
+/// m.
 pub(super) fn scale(runs: &[Rows], per_unit: Option<f64>, notes: &mut Vec<String>) -> Scale {
     let quantity = runs.first().map_or(Quantity::Counts, |r| r.position);
     if quantity == Quantity::Counts {

@@ -5,7 +5,7 @@ use super::{json, log, mat, npy, text};
 use device_sim::error::Error;
 use std::path::Path;
 
-/// Reads a file of any format that is known, told by its first bytes and its name's ending.
+/// Reads a file of any format that is known, recognised by its first bytes and its name's ending.
 pub(super) fn read(path: &Path) -> Result<Log, Error> {
     let file = path.display().to_string();
     let bytes = std::fs::read(path)

@@ -1,4 +1,5 @@
-//! HDF5, as MATLAB's `save` with `-v7.3` and h5py write it; only where the program was built with the feature `hdf5`.
+//! HDF5, as MATLAB's `save` with `-v7.3` and h5py write it; only where the program was built with
+//! the feature `hdf5`.
 
 use super::npy;
 use super::npy_array::Array;
@@ -11,7 +12,8 @@ const DEEPEST: usize = 8;
 /// Most numbers that a byte of a file may hold: what deflate makes of equal ones.
 const MOST_PER_BYTE: u64 = 1032;
 
-/// Reads every dataset of numbers; one of two sides gives a column for each place of the shorter one.
+/// Reads every dataset of numbers; one of two sides gives a column for each place of the shorter
+/// one.
 pub(super) fn read(file: &str, bytes: Vec<u8>) -> Result<Log, Error> {
     let unusable = |cause: &dyn std::fmt::Display| {
         Error::input(format_args!("{file}: is no usable HDF5 file ({cause}); write it again"))
@@ -35,7 +37,8 @@ struct Found {
 }
 
 impl Found {
-    /// Takes the datasets of a group and of those within it; MATLAB keeps what cells refer to in groups that begin with `#`.
+    /// Takes the datasets of a group and of those within it; MATLAB keeps what cells refer to in
+    /// groups that begin with `#`.
     fn group(&mut self, path: &str, group: &Group, depth: usize) -> Result<(), hdf5_pure::Error> {
         for name in group.datasets()? {
             self.dataset(join(path, &name), &group.dataset(&name)?)?;

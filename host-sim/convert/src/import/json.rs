@@ -1,5 +1,5 @@
-//! JSON as programs write it: an object of arrays, an array of objects, lines of objects, pandas' `to_json` in each of its
-//! orientations; nested objects give names with dots.
+//! JSON as programs write it: an object of arrays, an array of objects, lines of objects, pandas'
+//! `to_json` in each of its orientations; nested objects give names with dots.
 
 use super::table::{Column, Log, join};
 use device_sim::error::Error;

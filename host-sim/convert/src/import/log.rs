@@ -1,5 +1,5 @@
-//! MCAP logs of any program: messages in JSON and, with the feature `ros`, ROS 2 messages; a table for every topic. Chunks may be
-//! compressed with zstd or lz4.
+//! MCAP logs of any program: messages in JSON and, with the feature `ros`, ROS 2 messages; a table
+//! for every topic. Chunks may be compressed with zstd or lz4.
 
 use super::json;
 use super::table::{Column, Log, Table};

@@ -1,5 +1,6 @@
-//! MATLAB's `.mat` files of version 5 (what `save` writes without `-v7.3`, and SciPy's `savemat`): arrays and structures of
-//! arrays. The layout is that of MathWorks' "MAT-File Format": tagged elements, compressed ones within zlib.
+//! MATLAB's `.mat` files of version 5 (what `save` writes without `-v7.3`, and SciPy's `savemat`):
+//! arrays and structures of arrays. The layout is that of MathWorks' "MAT-File Format": tagged
+//! elements, compressed ones within zlib.
 
 use super::table::{Column, Log, join};
 use device_sim::error::Error;
@@ -106,7 +107,7 @@ impl Found {
         Ok(())
     }
 
-    /// The columns of an array, which stands column by column; its longer side are the rows.
+    /// The columns of an array, which is stored column by column; its longer side are the rows.
     fn array(&mut self, path: String, dimensions: &[usize], values: &[f64]) {
         let sides: Vec<usize> = dimensions.iter().copied().filter(|n| *n != 1).collect();
         match sides[..] {

@@ -1,5 +1,6 @@
-//! `import`: recordings as people have them become the files that `diagnose` reads, and whatever was assumed, changed or left
-//! out on the way is said. It reads tables and writes the contract's files; it may not know what is done with them.
+//! `import`: recordings as people have them become the files that `diagnose` reads, and whatever
+//! was assumed, changed or left out on the way is said. It reads tables and writes the contract's
+//! files; it may not know what is done with them.
 
 mod encoder_resolution;
 mod file;
@@ -140,8 +141,8 @@ pub fn import(request: &Request) -> Result<Imported, Error> {
     Ok(Imported { rig, to_fill_in, recordings, notes })
 }
 
-/// The rows of the files: each file's own where each has all columns, with one that goes on where another ends joined to it; else those of
-/// all files together.
+/// The rows of the files: each file's own where each has all columns, with one that goes on where
+/// another ends joined to it; else those of all files together.
 fn wholes(logs: &[Log], request: &Request, notes: &mut Vec<String>) -> Result<Vec<Rows>, Error> {
     let is_whole = |log: &Log| rows::is_whole(std::slice::from_ref(log), &request.columns, request.known);
     let one_run = logs.len() > 1 && request.columns.iter().any(|choice| choice.names_a_file(logs));

@@ -1,4 +1,5 @@
-//! One array of NumPy's `.npy` format, read by its specification (NumPy enhancement proposal 1, versions 1 to 3).
+//! One array of NumPy's `.npy` format, read by its specification (NumPy enhancement proposal 1,
+//! versions 1 to 3).
 
 /// An array of numbers, read as `f64` whatever they were.
 pub(super) struct Array {
@@ -52,7 +53,8 @@ impl Array {
         self.values.len()
     }
 
-    /// The columns of the array, whose rows run along its longest side; the first of several that are as long.
+    /// The columns of the array, whose rows run along its longest side; the first of several that
+    /// are as long.
     pub(super) fn columns(&self) -> Vec<Vec<f64>> {
         let long = (0..self.axes()).max_by_key(|axis| (self.shape[*axis], usize::MAX - axis));
         let (rows, stride) = long.map_or((1, 1), |axis| (self.shape[axis], self.strides[axis]));
@@ -66,7 +68,8 @@ impl Array {
     }
 }
 
-/// The distance between neighbours on each axis: the last axis is the nearest in C's order, the first in Fortran's.
+/// The distance between neighbours on each axis: the last axis is the nearest in C's order, the
+/// first in Fortran's.
 fn strides(shape: &[usize], is_fortran: bool) -> Vec<usize> {
     let mut strides = vec![1; shape.len()];
     let mut stride = 1;
@@ -114,7 +117,8 @@ fn numbers(kind: &str, data: &[u8], count: usize) -> Option<Vec<f64>> {
     Some(data.chunks_exact(width).map(read).collect())
 }
 
-/// Returns the function that reads a kind of number from its bytes, the least significant first and filled up with zeros.
+/// Returns the function that reads a kind of number from its bytes, the least significant first and
+/// filled up with zeros.
 fn number_of(kind: &str) -> Option<fn([u8; 8]) -> f64> {
     /// The first bytes.
     fn first<const N: usize>(wide: [u8; 8]) -> [u8; N] {

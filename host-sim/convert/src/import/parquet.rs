@@ -1,4 +1,5 @@
-//! Parquet, as pandas, Arrow and LeRobot write it; only where the program was built with the feature `parquet`.
+//! Parquet, as pandas, Arrow and LeRobot write it; only where the program was built with the
+//! feature `parquet`.
 
 use super::table::{Column, Log};
 use super::units::{self, Unit};
@@ -74,7 +75,8 @@ fn unit(of: &TypePtr) -> Option<Unit> {
     })
 }
 
-/// The names that a LeRobot dataset gives the elements of its lists: `meta/info.json` in a folder above the file.
+/// The names that a LeRobot dataset gives the elements of its lists: `meta/info.json` in a folder
+/// above the file.
 struct Names(Option<Value>);
 
 impl Names {
@@ -86,7 +88,8 @@ impl Names {
         Self(found)
     }
 
-    /// The name of an element of a list. They stand in a list, or in one within an object of one key.
+    /// The name of an element of a list. They stand in a list, or in one within an object of one
+    /// key.
     fn of(&self, column: &str, element: usize) -> Option<&str> {
         let names = self.0.as_ref()?.get("features")?.get(column)?.get("names")?;
         let list = names.as_array().or_else(|| names.as_object()?.values().next()?.as_array())?;

@@ -1,4 +1,4 @@
-//! Which column is what: told by `--column`, else from the names that people give.
+//! Which column is what: given by `--column`, else from the names that people give.
 
 use super::table::{Column, Log};
 use super::units::{self, Quantity, Unit};
@@ -76,7 +76,8 @@ pub struct Choice {
 }
 
 impl Choice {
-    /// The column that it names and the sign that it gives; `None` where it names no column of `logs`.
+    /// The column that it names and the sign that it gives; `None` where it names no column of
+    /// `logs`.
     fn column(&self, logs: &[Log]) -> Option<(Place, f64)> {
         let turned = || Some((find(logs, self.name.strip_prefix('-')?)?, -1.0));
         find(logs, &self.name).map(|at| (at, 1.0)).or_else(turned)
@@ -210,7 +211,8 @@ fn by_unit(quantity: Quantity) -> Option<(Role, u32)> {
     }
 }
 
-/// Every column, as errors list it: those that the file does not name with their first values, those of several files by file.
+/// Every column, as errors list it: those that the file does not name with their first values,
+/// those of several files by file.
 fn listed(logs: &[Log]) -> String {
     let of_log = |log: &Log| {
         let mut names: Vec<String> = log
@@ -303,7 +305,8 @@ pub(super) fn check(logs: &[Log], choices: &[Choice]) -> Result<(), Error> {
     Ok(())
 }
 
-/// The column of a role: the one that was said, else the one whose name fits best; an error where two fit alike.
+/// The column of a role: the one that was said, else the one whose name fits best; an error where
+/// two fit alike.
 pub(super) fn choose(logs: &[Log], role: Role, choices: &[Choice]) -> Result<Option<Chosen>, Error> {
     let files: Vec<&str> = logs.iter().map(|l| l.file.as_str()).collect();
     let unit_of = |at: Place| logs[at.0].tables[at.1].columns[at.2].unit;

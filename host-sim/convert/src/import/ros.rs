@@ -1,4 +1,5 @@
-//! Messages of ROS 2 bags: CDR, by the definition that the bag holds; only where the program was built with the feature `ros`.
+//! Messages of ROS 2 bags: CDR, by the definition that the bag holds; only where the program was
+//! built with the feature `ros`.
 
 use re_cdr::{BigEndian, CdrReader, LittleEndian};
 use re_ros_msg::MessageSchema;
@@ -21,7 +22,8 @@ impl Decoder {
         Some(Self { schema })
     }
 
-    /// A message as JSON, its arrays by their elements' names where it names them; none where it is damaged.
+    /// A message as JSON, its arrays by their elements' names where it names them; none where it is
+    /// damaged.
     pub(super) fn decode(&self, data: &[u8]) -> Option<Json> {
         let specs = std::iter::once(&self.schema.spec).chain(&self.schema.dependencies);
         let resolver = MapResolver::new(specs.map(|spec| (short(&spec.name), spec)));
@@ -83,7 +85,8 @@ fn array(items: &PrimitiveArray) -> Json {
     }
 }
 
-/// Names the elements of a message's arrays by its `name` or `joint_names`, as a joint state has them.
+/// Names the elements of a message's arrays by its `name` or `joint_names`, as a joint state has
+/// them.
 fn by_joint(map: &mut Map<String, Json>) {
     let names = ["name", "joint_names"].into_iter().find_map(|key| map.get(key)?.as_array().cloned());
     let Some(names) = names.filter(|names| !names.is_empty() && names.iter().all(Json::is_string)) else {

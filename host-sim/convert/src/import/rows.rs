@@ -267,8 +267,9 @@ fn column<'a>(logs: &'a [Log], chosen: &Chosen) -> &'a super::table::Column {
     &logs[chosen.at.0].tables[chosen.at.1].columns[chosen.at.2]
 }
 
-/// The unit of every column that was found. A column that nobody asked for and that does not say its unit is left out, and a
-/// reference is taken to have the position's; what only a person can know becomes a question.
+/// The unit of every column that was found. A column that nobody asked for and that does not say
+/// its unit is left out, and a reference is taken to have the position's; what only a person can
+/// know becomes a question.
 fn units(
     logs: &[Log],
     found: &mut BTreeMap<Role, Chosen>,

@@ -1,5 +1,5 @@
-//! Rows made fit for the contract: a clock that rises, no holes, no wraps, no minutes at rest. Whatever is changed or left out
-//! is said.
+//! Rows made fit for the contract: a clock that rises, no holes, no wraps, no minutes at rest.
+//! Whatever is changed or left out is said.
 
 use super::roles::Role;
 use super::rows::{Rows, median_step};
@@ -145,7 +145,8 @@ fn restarts(rows: Rows, notes: &mut Vec<String>) -> Vec<Rows> {
     out
 }
 
-/// Rows of one stamp: spread until the next stamp where the clock is coarser than the rows, else the last one stays.
+/// Rows of one stamp: spread until the next stamp where the clock is coarser than the rows, else
+/// the last one stays.
 fn even_clock(mut run: Rows, notes: &mut Vec<String>) -> Rows {
     let n = run.time.len();
     let repeated = run.time.windows(2).filter(|w| w[1] == w[0]).count();
@@ -236,7 +237,8 @@ fn integrate(run: &mut Rows, notes: &mut Vec<String>) {
     notes.push("only the speed was recorded: the position is its integral".into());
 }
 
-/// The run without rest at its ends, cut where it rests for long: at rest nothing is learnt, and it costs time.
+/// The run without rest at its ends, cut where it rests for long: at rest nothing is learnt, and it
+/// costs time.
 fn without_rest(run: Rows, notes: &mut Vec<String>) -> Vec<Rows> {
     let position = &run.columns[&Role::Position];
     let command = run.columns.get(&Role::Command);
@@ -249,7 +251,8 @@ fn without_rest(run: Rows, notes: &mut Vec<String>) -> Vec<Rows> {
         let (low, high) = span(c);
         0.1 * (high - low)
     });
-    // Moments at which something happens: the axis has moved, or the command has changed, since the last of them.
+    // Moments at which something happens: the axis has moved, or the command has changed, since the
+    // last of them.
     let mut anchor = (position[0], command.map_or(0.0, |c| c[0]));
     let mut busy = Vec::new();
     for i in 0..position.len() {

@@ -1,5 +1,5 @@
-//! Decides if files with the same columns are runs of their own: only their clocks or their names can say so. Two sensors of one run
-//! have the same columns too.
+//! Decides if files with the same columns are runs of their own: only their clocks or their names
+//! can say so. Two sensors of one run have the same columns too.
 
 use super::rows::Rows;
 use super::table::Log;
@@ -7,14 +7,16 @@ use super::units;
 use device_sim::error::Error;
 use std::path::Path;
 
-/// Clocks that begin with the recording tell two runs apart where their lengths differ by this part.
+/// Clocks that begin with the recording tell two runs apart where their lengths differ by this
+/// part.
 const ANOTHER_LENGTH: f64 = 0.01;
 /// Words by which people tell their runs apart.
 const RUNS: &str = "fit holdout train training test val valid validation verify estimation identification run runs trial take \
                     rep repeat exp experiment session rec recording log slow slower fast faster up down left right low high \
                     day night before after first second third one two three monday tuesday wednesday thursday friday";
 
-/// Refuses files of which nothing says whether they are runs; `wholes` holds the rows of each of `logs`.
+/// Refuses files of which nothing says whether they are runs; `wholes` holds the rows of each of
+/// `logs`.
 pub(super) fn check(logs: &[Log], wholes: &[Rows]) -> Result<(), Error> {
     for (i, a) in logs.iter().enumerate() {
         for (k, b) in logs.iter().enumerate().skip(i + 1) {
@@ -60,7 +62,8 @@ fn compare(a: &Rows, b: &Rows) -> Clocks {
     if (a - b).abs() > ANOTHER_LENGTH * a.max(b) { Clocks::Apart } else { Clocks::Unknown }
 }
 
-/// True if two names differ only in what people tell runs apart by: numbers, single letters, words such as `fit` and `holdout`.
+/// True if two names differ only in what people tell runs apart by: numbers, single letters, words
+/// such as `fit` and `holdout`.
 fn names_are_of_runs(a: &str, b: &str) -> bool {
     let words = |file: &str| {
         let stem = Path::new(file).file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();

@@ -18,7 +18,7 @@ pub(super) struct Column {
 }
 
 impl Column {
-    /// A column whose unit stands in its name.
+    /// A column whose unit is in its name.
     pub(super) fn new(name: impl Into<String>, values: Vec<f64>) -> Self {
         let name = name.into();
         let (plain, unit) = units::split_name(&name);
@@ -77,7 +77,8 @@ impl Log {
         log
     }
 
-    /// The arrays of a file of some format as tables, with a note on what was read and what was left out because it holds no numbers.
+    /// The arrays of a file of some format as tables, with a note on what was read and what was
+    /// left out because it holds no numbers.
     pub(super) fn of_arrays(file: &str, format: &str, columns: Vec<Column>, left_out: &[String]) -> Self {
         let mut notes = vec![format!("read as {format}: {} columns", columns.len())];
         if !left_out.is_empty() {

@@ -1,4 +1,5 @@
-//! Tables as text: any separator, decimal point or comma, comments, preambles, a row of units, dates, no header at all.
+//! Tables as text: any separator, decimal point or comma, comments, preambles, a row of units,
+//! dates, no header at all.
 
 use super::table::{Column, Log, Table};
 use super::units;
@@ -10,7 +11,8 @@ const COMMENTS: [&str; 4] = ["#", "%", "//", "!"];
 /// Lines from which the layout is told.
 const SAMPLE: usize = 200;
 
-/// Text from bytes: UTF-8, UTF-16 with its mark, else Latin-1, which German and French instruments write.
+/// Text from bytes: UTF-8, UTF-16 with its mark, else Latin-1, which German and French instruments
+/// write.
 pub(super) fn decode(bytes: &[u8]) -> String {
     let wide = |from: fn([u8; 2]) -> u16| {
         let units: Vec<u16> = bytes[2..].chunks_exact(2).map(|b| from([b[0], b[1]])).collect();
@@ -83,7 +85,8 @@ struct Layout {
     count: usize,
 }
 
-/// The separator under which most fields of the sample are numbers, of as many columns as the most lines have.
+/// The separator under which most fields of the sample are numbers, of as many columns as the most
+/// lines have.
 fn layout(lines: &[(usize, &str)]) -> Layout {
     let from = lines.len().saturating_sub(SAMPLE);
     let sample = &lines[from..];
@@ -159,7 +162,8 @@ pub(super) fn read(file: &str, bytes: &[u8]) -> Result<Log, Error> {
 /// Lines, each with a number.
 type Lines<'a> = Vec<(usize, &'a str)>;
 
-/// Lines with their numbers from 1, and comments with the count of lines before them; empty ones are left out.
+/// Lines with their numbers from 1, and comments with the count of lines before them; empty ones
+/// are left out.
 fn lines_and_comments(text: &str) -> (Lines<'_>, Lines<'_>) {
     let (mut lines, mut comments) = (Vec::new(), Vec::new());
     for (index, line) in text.lines().enumerate() {
@@ -175,7 +179,8 @@ fn lines_and_comments(text: &str) -> (Lines<'_>, Lines<'_>) {
     (lines, comments)
 }
 
-/// The numbers of each column; lines of another number of fields or without a number are left out, with a note.
+/// The numbers of each column; lines of another number of fields or without a number are left out,
+/// with a note.
 fn values(lines: &[(usize, &str)], separator: char, count: usize, notes: &mut Vec<String>) -> Vec<Vec<f64>> {
     let mut columns: Vec<Vec<f64>> = vec![Vec::with_capacity(lines.len()); count];
     let (mut ragged, mut first_ragged) = (0, 0);
@@ -205,7 +210,8 @@ const MOST_CHANNELS: usize = 64;
 /// So many times as many values as rows make them channels.
 const LONGER_THAN_MANY: usize = 8;
 
-/// A table whose rows are the channels, each with its name, and perhaps its unit, before its values.
+/// A table whose rows are the channels, each with its name, and perhaps its unit, before its
+/// values.
 fn channels_in_rows(file: &str, lines: &[(usize, &str)], separator: char, count: usize) -> Option<Log> {
     if lines.len() > MOST_CHANNELS || count < LONGER_THAN_MANY * lines.len().max(4) {
         return None;
@@ -245,8 +251,8 @@ fn decimal_comma(lines: &[(usize, &str)], separator: char) -> bool {
 /// Names, none where they are made up, and units of their own.
 type Names = Vec<(Option<String>, Option<units::Unit>)>;
 
-/// The names of the columns with the units of a row of their own: from the lines above the numbers, else from the last comment
-/// of as many words, else made up.
+/// The names of the columns with the units of a row of their own: from the lines above the numbers,
+/// else from the last comment of as many words, else made up.
 fn header(
     above: &[(usize, &str)],
     comments: &[(usize, &str)],

@@ -93,7 +93,8 @@ const UNITS: &[(&str, Quantity, f64)] = &[
     ("dac lsb pwm duty % percent pct 1 - code codes raw", Quantity::Plain, 1.0),
 ];
 
-/// The unit that a text names; none where it is not one. Upper case and lower case are the same, but for `MN`.
+/// The unit that a text names; none where it is not one. Upper case and lower case are the same,
+/// but for `MN`.
 pub(super) fn parse(text: &str) -> Option<Unit> {
     let text = text.trim().trim_matches(['[', ']', '(', ')', '{', '}', '"']).trim();
     let plain: String = text.replace('⋅', "·").replace(' ', "_").to_lowercase();
@@ -106,8 +107,8 @@ pub(super) fn parse(text: &str) -> Option<Unit> {
         .map(|(_, quantity, factor)| Unit { quantity: *quantity, factor: *factor })
 }
 
-/// A column's name without its unit, and the unit where it holds one: `theta [deg]`, `theta (deg)`, `theta_deg`, `theta/deg`,
-/// `thetaDeg`.
+/// A column's name without its unit, and the unit where it holds one: `theta [deg]`, `theta (deg)`,
+/// `theta_deg`, `theta/deg`, `thetaDeg`.
 pub(super) fn split_name(name: &str) -> (String, Option<Unit>) {
     let name = name.trim().trim_matches('"');
     for (open, close) in [('[', ']'), ('(', ')'), ('{', '}')] {
@@ -138,7 +139,8 @@ pub(super) fn split_name(name: &str) -> (String, Option<Unit>) {
     (name.to_owned(), None)
 }
 
-/// The words of a name, in lower case: split at anything but letters and digits and before a capital.
+/// The words of a name, in lower case: split at anything but letters and digits and before a
+/// capital.
 pub(super) fn words(name: &str) -> Vec<String> {
     let mut words = vec![String::new()];
     let mut before = ' ';

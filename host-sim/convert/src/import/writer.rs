@@ -1,4 +1,5 @@
-//! The contract's files: a rig of which the values are still to be filled in, and a CSV for every run.
+//! The contract's files: a rig of which the values are still to be filled in, and a CSV for every
+//! run.
 
 use super::encoder_resolution::Scale;
 use super::roles::Role;
@@ -26,7 +27,8 @@ fn value(x: Option<f64>, unit: &str, what: &str) -> String {
     }
 }
 
-/// The text of `rig.toml`. Values that no recording tells are `nan`, which `diagnose` refuses until they are filled in.
+/// The text of `rig.toml`. Values that no recording tells are `nan`, which `diagnose` refuses until
+/// they are filled in.
 pub(super) fn rig(name: &str, rows: &Rows, scale: Scale, known: &RigValues) -> String {
     let linear = rows.position == Quantity::Length;
     let (kind, force, mass, length) =

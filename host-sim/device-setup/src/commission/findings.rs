@@ -1,4 +1,5 @@
-//! The wiring and the mechanism of a device, found from recordings of its first movements. Pure calculation.
+//! The wiring and the mechanism of a device, found from recordings of its first movements. Pure
+//! calculation.
 
 use control_core::controller::Sample;
 use control_core::units::{Grams, Newtons};
@@ -16,7 +17,8 @@ const USUAL_LINES: [u16; 26] = [
     64, 100, 128, 200, 250, 256, 300, 360, 400, 500, 512, 600, 720, 800, 900, 1_000, 1_024, 1_200, 1_250,
     1_500, 2_000, 2_048, 2_500, 3_600, 4_096, 5_000,
 ];
-/// Ticks over which a speed is taken, and over which its change is set against the torque: 4 ms and 10 ms.
+/// Ticks over which a speed is taken, and over which its change is set against the torque: 4 ms and
+/// 10 ms.
 const SPEED_TICKS: usize = 40;
 const WINDOW_TICKS: usize = 100;
 /// Slower than this a motor may be about to stick, in rad/s.
@@ -126,8 +128,8 @@ fn moved(samples: &[Sample]) -> Result<i32, CommissioningError> {
     }
 }
 
-/// Counts a turn and their sign from `turns` turns of the roller in the direction of insertion; `known` where a person knows
-/// better.
+/// Counts a turn and their sign from `turns` turns of the roller in the direction of insertion;
+/// `known` where a person knows better.
 pub(crate) fn counts_a_turn(
     samples: &[Sample],
     turns: u32,
@@ -176,8 +178,8 @@ pub struct Mechanism {
     pub offset: f64,
 }
 
-/// `J·dω = ∫(τ + offset − dry·sign(ω) − viscous·ω)·dt` over every 10 ms in which the roller moved one way, by least
-/// squares.
+/// `J·dω = ∫(τ + offset − dry·sign(ω) − viscous·ω)·dt` over every 10 ms in which the roller moved
+/// one way, by least squares.
 pub fn mechanism(samples: &[Sample], device: &Device) -> Result<Mechanism, CommissioningError> {
     let (middle, span) = (f64::from(device.dac.mid_scale()), f64::from(device.dac.span()));
     let full_scale = device.full_scale_torque.0.to_num::<f64>() * 1e-3;
@@ -207,7 +209,8 @@ pub fn mechanism(samples: &[Sample], device: &Device) -> Result<Mechanism, Commi
     Ok(Mechanism { inertia, viscous, dry, offset })
 }
 
-/// The same as felt along the needle over a roller of this radius, with a drive that is late by `delay_us`.
+/// The same as felt along the needle over a roller of this radius, with a drive that is late by
+/// `delay_us`.
 pub(crate) fn along_the_needle(found: &Mechanism, radius_mm: f64, delay_us: u16) -> config::Mechanism {
     let radius = radius_mm * 1e-3;
     config::Mechanism {
@@ -217,8 +220,8 @@ pub(crate) fn along_the_needle(found: &Mechanism, radius_mm: f64, delay_us: u16)
     }
 }
 
-/// The largest movement in a tick, in counts, that makes the device too fast at 0.4 m/s: its ceiling of speed. The
-/// device trips at a sixth of it.
+/// The largest movement in a tick, in counts, that makes the device too fast at 0.4 m/s: its
+/// ceiling of speed. The device trips at a sixth of it.
 pub(crate) fn counts_per_tick(radius_mm: f64, counts_per_turn: u16) -> u16 {
     let per_count = TAU * radius_mm / f64::from(counts_per_turn);
     // Two is the least that the device takes.
@@ -234,7 +237,8 @@ pub(crate) fn converter_zero(device: &Device, offset: f64) -> Result<i16, Commis
     if zero.abs() <= most { Ok(zero.round() as i16) } else { Err(CommissioningError::Zero(zero)) }
 }
 
-/// Four unknowns from the normal equations, by elimination with the largest pivot; none where the rows say too little.
+/// Four unknowns from the normal equations, by elimination with the largest pivot; none where the
+/// rows say too little.
 fn least_squares(rows: &[([f64; 4], f64)]) -> Option<[f64; 4]> {
     // Each column by its own size: inertia and time are some nine powers of ten apart.
     let scale: [f64; 4] = std::array::from_fn(|i| rows.iter().map(|(x, _)| x[i] * x[i]).sum::<f64>().sqrt());

@@ -1,6 +1,6 @@
-//! `commission`: finds out how a device is wired and built before anybody holds its needle, and gives it its part of the
-//! configuration. The encoder is known before the motor moves, and the motor moves with at most 2 mN·m: more the device
-//! itself refuses until it has been commissioned.
+//! `commission`: finds out how a device is wired and built before anybody holds its needle, and
+//! gives it its part of the configuration. The encoder is known before the motor moves, and the
+//! motor moves with at most 2 mN·m: more the device itself refuses until it has been commissioned.
 
 pub mod findings;
 
@@ -163,7 +163,8 @@ pub async fn commission(
 ) -> Result<Outcome, Error> {
     let mut bench = Bench::open(line).await?;
     let before = bench.device().await?;
-    // Whatever it was: until it has passed again it is none, and what was found of its forces is another device's.
+    // Whatever it was: until it has passed again it is not commissioned, and the forces that were
+    // found are another device's.
     let mut device = Device { commissioned: false, compensation: Compensation::NONE, ..before };
     let rests = |samples: &[_]| findings::has_moved_and_rests(samples, ticks(REST));
 
@@ -197,7 +198,8 @@ pub async fn commission(
     let (mechanism, leads_reversed) = find_mechanism(&mut bench, &mut device).await?;
     device.dac_zero = findings::converter_zero(&device, mechanism.offset)?;
     device.mechanism = findings::along_the_needle(&mechanism, radius_mm, device.mechanism.delay_us);
-    // Never above what the pulses were driven with: the device takes nothing higher than it has proved.
+    // Never above what the pulses were driven with: the device takes nothing higher than it has
+    // proved.
     device.limits.stiffness = device.limits.stiffness.min(stiffest(&device));
     let stiffness_lowered = device.limits.stiffness < before.limits.stiffness;
     bench.configure(&device).await?;
@@ -205,7 +207,8 @@ pub async fn commission(
     Ok(Outcome { record, channels_swapped, leads_reversed, radius_mm, mechanism, stiffness_lowered })
 }
 
-/// Finds the mechanism by pulses, and whether the motor's leads are reversed; then the device drives it the other way from now on.
+/// Finds the mechanism by pulses, and whether the motor's leads are reversed; then the device
+/// drives it the other way from now on.
 async fn find_mechanism(bench: &mut Bench<'_>, device: &mut Device) -> Result<(Mechanism, bool), Error> {
     if let Some(mechanism) = pulses(bench, device).await? {
         return Ok((mechanism, false));

@@ -1,8 +1,10 @@
-//! Finds the rotor's angle without an index: while the roller turns slowly once to and fro, the motor's torque swings with the
-//! waves that were diagnosed, and there is one place from which they fit. Pure calculation.
+//! Finds the rotor's angle without an index: while the roller turns slowly once to and fro, the
+//! motor's torque swings with the waves that were diagnosed, and there is one place from which they
+//! fit. Pure calculation.
 //!
-//! For each order N the torque beyond the inertia's, less its mean in each direction, is projected onto `e^{−iNθ}`. The angle is
-//! the shift at which the diagnosed waves and these projections agree best.
+//! For each order N the torque beyond the inertia's, less its mean in each direction, is projected
+//! onto `e^{−iNθ}`. The angle is the shift at which the diagnosed waves and these projections agree
+//! best.
 
 use control_core::TICK_HZ;
 use control_core::controller::Sample;
@@ -28,8 +30,8 @@ pub struct Angle {
     pub agreement: f64,
 }
 
-/// From the samples of a slow turn. `waves` are order, amplitude in N·m, phase in rad; `torque_per_code` is N·m, `middle` the
-/// code of no torque, `inertia` kg·m².
+/// From the samples of a slow turn. `waves` are order, amplitude in N·m, phase in rad;
+/// `torque_per_code` is N·m, `middle` the code of no torque, `inertia` kg·m².
 pub fn find(
     samples: &[Sample],
     waves: &[(u16, f64, f64)],
@@ -74,7 +76,8 @@ struct Row {
     inwards: bool,
 }
 
-/// The rows in which the roller moves. `rad` is the angle of a count, `torque` turns a code into N·m, `inertia` is in kg·m².
+/// The rows in which the roller moves. `rad` is the angle of a count, `torque` turns a code into
+/// N·m, `inertia` is in kg·m².
 fn rows(samples: &[Sample], rad: f64, torque: impl Fn(f64) -> f64, inertia: f64) -> Vec<Row> {
     let speed = |at: usize| {
         let moved = f64::from(samples[at + SPAN / 2].count) - f64::from(samples[at - SPAN / 2].count);
@@ -92,7 +95,8 @@ fn rows(samples: &[Sample], rad: f64, torque: impl Fn(f64) -> f64, inertia: f64)
         .collect()
 }
 
-/// The projections of the torque onto sine and cosine of each wave, in N·m; the mean of each direction is left out.
+/// The projections of the torque onto sine and cosine of each wave, in N·m; the mean of each
+/// direction is left out.
 fn seen_waves(rows: &[Row], waves: &[(u16, f64, f64)]) -> Vec<(f64, f64)> {
     let mean = |inwards: bool| {
         let (sum, count) = rows
@@ -121,7 +125,8 @@ fn seen_waves(rows: &[Row], waves: &[(u16, f64, f64)]) -> Vec<(f64, f64)> {
 mod tests {
     use super::*;
 
-    /// A turn to and fro at 1 rad/s of a mechanism whose waves begin at `index` counts, with dry friction and noise.
+    /// A turn to and fro at 1 rad/s of a mechanism whose waves begin at `index` counts, with dry
+    /// friction and noise.
     fn turn(waves: &[(u16, f64, f64)], index: i32) -> Vec<Sample> {
         let rad = TAU / 4_000.0;
         (0..130_000)

@@ -1,4 +1,5 @@
-//! From what a diagnosis found (its patched rig) to the numbers that the device feeds forward. Pure calculation.
+//! From what a diagnosis found (its patched rig) to the numbers that the device feeds forward. Pure
+//! calculation.
 
 use control_core::compensation::{Compensation, Friction, Gains, Wave};
 use control_core::kinematics::WINDOW_TICKS;
@@ -11,10 +12,11 @@ use diagnosis::rig::{Kind, Rig};
 use fixed::types::{I8F24, I16F16};
 use std::f64::consts::TAU;
 
-/// Gains at `--gain 1`: so much of what was found. Of friction less, for it is what keeps a stiff wall quiet.
+/// Gains at `--gain 1`: so much of what was found. Of friction less, for it is what keeps a stiff
+/// wall quiet.
 const MOST: [f64; 4] = [0.92, 0.8, 0.92, 0.92];
-/// Friction is given back above so many counts in a window of the speed estimate, and all of it from so many on: slow hands insert
-/// at 3 mm/s, where a count in a window is 1.2 mm/s.
+/// Friction is given back above so many counts in a window of the speed estimate, and all of it
+/// from so many on: slow hands insert at 3 mm/s, where a count in a window is 1.2 mm/s.
 const REST_COUNTS: f64 = 1.06;
 const FULL_COUNTS: f64 = 2.5;
 /// An order may be off a whole number by so much, and is rounded.
@@ -25,7 +27,8 @@ const WHOLE: f64 = 0.02;
 pub struct Found {
     /// For the device.
     pub compensation: Compensation,
-    /// Waves by angle in N·m on the device's scale: order, amplitude, phase in rad. For finding the rotor's angle.
+    /// Waves by angle in N·m on the device's scale: order, amplitude, phase in rad. For finding the
+    /// rotor's angle.
     pub waves: Vec<(u16, f64, f64)>,
     /// Inertia in kg·m² on the device's scale.
     pub inertia: f64,
@@ -107,10 +110,10 @@ impl Sums {
                 let waves = self.read_waves(effect, 1.0);
                 self.ripple.extend(waves);
             }
-            EffectName::CommandDeadband if effect.shape.get("shift").is_some_and(|shift| *shift != 0.0) => {
-                self.deadband = effect.shape.get("half_width").copied().unwrap_or(0.0) * self.per_code;
-            }
-            other => self.left_out.push(format!("{} is not fed forward", other.in_words())),
+            other => match effect.shifted_dead_band() {
+                Some(half_width) => self.deadband = half_width * self.per_code,
+                None => self.left_out.push(format!("{} is not fed forward", other.in_words())),
+            },
         }
     }
 

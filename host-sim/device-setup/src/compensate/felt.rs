@@ -1,8 +1,9 @@
-//! The force of the mechanism that a hand would feel, measured without a hand: the soft servo of the device moves the roller slowly in and
-//! out and then holds it, and the servo's force is the one that a hand would need. Pure calculation.
+//! The force of the mechanism that a hand would feel, measured without a hand: the soft servo of
+//! the device moves the roller slowly in and out and then holds it, and the servo's force is the
+//! one that a hand would need. Pure calculation.
 //!
-//! Where the device feeds forward as well, its torque is not the servo's alone. The servo's is computed again by the control
-//! core itself, from the same counts.
+//! Where the device feeds forward as well, its torque is not the servo's alone. The servo's is
+//! computed again by the control core itself, from the same counts.
 
 use control_core::controller::{LargeOrder, Sample, TickInput};
 use control_core::excitation::{Excitation, Reference};

@@ -1,6 +1,6 @@
-//! `compensate`: turns what a diagnosis found of a device's own forces into what the device feeds forward, finds the rotor's
-//! angle, and shows what a hand would have felt before and feels after. The needle is out; the same commands and bytes serve a
-//! real device and the virtual one.
+//! `compensate`: turns what a diagnosis found of a device's own forces into what the device feeds
+//! forward, finds the rotor's angle, and shows what a hand would have felt before and feels after.
+//! The needle is out; the same commands and bytes serve a real device and the virtual one.
 
 pub mod angle;
 pub mod coefficients;
@@ -37,7 +37,8 @@ const DOWN_RAD: f64 = 0.5;
 
 /// A tilt that differs by less says too little of a weight, rad.
 const LEAST_TILT_RAD: f64 = 0.15;
-/// A phase counts as worse where it is felt by more than this beyond what it was: so far two runs of the same device differ.
+/// A phase counts as worse where it is felt by more than this beyond what it was: so far two runs
+/// of the same device differ.
 const REPEATS_N: f64 = 2e-3;
 const REPEATS_SHARE: f64 = 0.05;
 
@@ -56,7 +57,8 @@ pub struct Outcome {
     pub weight_mnm: Option<f64>,
     /// The findings that cannot be fed forward, a sentence each.
     pub left_out: Vec<String>,
-    /// The parts that were tried and undone because the hand would have felt more than before, a sentence each.
+    /// The parts that were tried and undone because the hand would have felt more than before, a
+    /// sentence each.
     pub taken_back: Vec<String>,
     /// False where everything was taken back: the device is configured as it was before.
     pub is_compensated: bool,
@@ -92,9 +94,10 @@ impl Outcome {
     }
 }
 
-/// Compensates the device behind `line` for what `rig` found, with gains at `share` of the most that is usual; `ask` is told each
-/// step before it is done, and may end it. No phase is felt more afterwards than before: what makes one worse is taken back. Where
-/// it ends early, the device is given back what it had before.
+/// Compensates the device behind `line` for what `rig` found, with gains at `share` of the most
+/// that is usual; `ask` is told each step before it is done, and may end it. No phase is felt more
+/// afterwards than before: what makes one worse is taken back. Where it ends early, the device is
+/// given back what it had before.
 pub async fn compensate(
     line: &mut dyn Line,
     rig: &Rig,
@@ -181,7 +184,8 @@ impl<A: AsyncFnMut(Step) -> Result<(), Error>> Work<'_, '_, A> {
         played(self.bench, turns).await
     }
 
-    /// Takes the weight over that the same turns show, level and tilted; says so where they cannot show it.
+    /// Takes the weight over that the same turns show, level and tilted; says so where they cannot
+    /// show it.
     fn take_weight(&mut self, level: &[Sample], tilted: &[Sample]) -> Option<f64> {
         match weight::find(level, tilted, &self.before) {
             Ok(weight_mnm) => {
@@ -195,8 +199,8 @@ impl<A: AsyncFnMut(Step) -> Result<(), Error>> Work<'_, '_, A> {
         }
     }
 
-    /// Tries all that was found, and takes parts back, the most harmful first, until no phase is felt more than before. None where
-    /// nothing is left.
+    /// Tries all that was found, and takes parts back, the most harmful first, until no phase is
+    /// felt more than before. None where nothing is left.
     async fn keep_what_helps(
         &mut self,
         full: &Device,

@@ -16,7 +16,8 @@ pub enum Step {
     Before,
     /// The same, with what is fed forward.
     After,
-    /// The same without one part of it, because with all of it the hand would feel more than before.
+    /// The same without one part of it, because with all of it the hand would feel more than
+    /// before.
     Without(Part),
 }
 

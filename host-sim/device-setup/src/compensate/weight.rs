@@ -1,6 +1,6 @@
-//! Finds the weight that pulls at the needle when the device is tilted: the same slow turn to and fro, once level and once tilted,
-//! differs in its mean torque by the weight alone. Friction acts in both directions and waves go round, so that neither shows in the
-//! mean. Pure calculation.
+//! Finds the weight that pulls at the needle when the device is tilted: the same slow turn to and
+//! fro, once level and once tilted, differs in its mean torque by the weight alone. Friction acts
+//! in both directions and waves go round, so that neither shows in the mean. Pure calculation.
 
 use super::{LEAST_TILT_RAD, TURNS};
 use control_core::controller::Sample;
@@ -9,8 +9,8 @@ use control_core::{Device, TICK_HZ};
 /// Torque fades in within this, ticks.
 const FADED: usize = TICK_HZ as usize / 2;
 
-/// Returns the weight in mN·m at a tilt of 90°, or a sentence why it was not found. `level` and `tilted` are the samples of the same
-/// turns.
+/// Returns the weight in mN·m at a tilt of 90°, or a sentence why it was not found. `level` and
+/// `tilted` are the samples of the same turns.
 pub fn find(level: &[Sample], tilted: &[Sample], device: &Device) -> Result<f64, String> {
     let [level, tilted] = [mean(level, device), mean(tilted, device)];
     let apart = tilted.sine - level.sine;

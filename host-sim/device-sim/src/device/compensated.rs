@@ -1,4 +1,5 @@
-//! The compensation of a device's part as a file has it: torques in mN·m, phases in degrees, gains as shares.
+//! The compensation of a device's part as a file has it: torques in mN·m, phases in degrees, gains
+//! as shares.
 
 use crate::profile::fix;
 use control_core::compensation::{Compensation, Friction, Gain, Gains, VERSION, Wave};

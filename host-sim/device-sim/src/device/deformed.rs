@@ -1,9 +1,11 @@
-//! The picture's tissue beside the virtual device: how far its surface is displaced where the needle goes in. By choice, and off by
-//! default, the force law of Paper 000 counts depth from there (its force function takes "position and velocity of the interacting
-//! objects" from position-based dynamics).
+//! The picture's tissue beside the virtual device: how far its surface is displaced where the
+//! needle goes in. By choice, and off by default, the force law of Paper 000 counts depth from
+//! there (its force function takes "position and velocity of the interacting objects" from
+//! position-based dynamics).
 //!
-//! The surface is taken at four points one spacing of the grid around the entry: the pierced place itself goes with the needle, and a depth
-//! past it would be zero until the skin gives way. This is an assumption; the paper does not say where it measures.
+//! The surface is taken at four points one spacing of the grid around the entry: the pierced place
+//! itself goes with the needle, and a depth past it would be zero until the skin gives way. This is
+//! an assumption; the paper does not say where it measures.
 
 use crate::profile::Profile;
 use control_core::config::{Law, Tissue as Kind};
@@ -55,7 +57,8 @@ impl Deformed {
         Ok(Self { tissue, layers, around, ticks: 0 })
     }
 
-    /// Follows the device by a tick; sometimes where the surface is now, along the needle past its rest.
+    /// Follows the device by a tick; sometimes where the surface is now, along the needle past its
+    /// rest.
     pub(super) fn follow(&mut self, output: &TickOutput) -> Option<Millimetres> {
         for (wall, layer) in self.layers.into_iter().enumerate() {
             let bit = 1_u8.unbounded_shl(layer.into());
@@ -93,7 +96,8 @@ mod tests {
     use control_core::units::{Counts, Milliradians};
     use control_core::{Controller, Order, TickInput};
 
-    /// The forces of an insertion at 5 mm/s from 1 mm before the skin to 12 mm along the needle, one a tick, N.
+    /// The forces of an insertion at 5 mm/s from 1 mm before the skin to 12 mm along the needle,
+    /// one a tick, N.
     fn forces(is_relative: bool) -> Vec<f64> {
         let profile = Profile::find("phantom").expect("it is built in");
         let mut deformed = Deformed::new(&profile).expect("it can be built");

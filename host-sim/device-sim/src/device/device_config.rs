@@ -1,6 +1,6 @@
-//! The device's part of a configuration as a person or `commission` writes it (TOML, decimal numbers with their unit in the
-//! key), and as the control law takes it ([`Device`], fixed point). It knows nothing of patients. Every key may be left
-//! out: the built-in device's value stands then.
+//! The device's part of a configuration as a person or `commission` writes it (TOML, decimal
+//! numbers with their unit in the key), and as the control law takes it ([`Device`], fixed point).
+//! It knows nothing of patients. Every key may be left out: the built-in device's value holds then.
 
 use super::compensated::Compensated;
 use super::grip::Grip;
@@ -63,7 +63,8 @@ impl DeviceConfig {
     }
 }
 
-/// The text of a device's part as the device told it, which [`DeviceConfig::parse`] reads again to the last place.
+/// The text of a device's part as the device told it, which [`DeviceConfig::parse`] reads again to
+/// the last place.
 pub fn to_toml(name: &str, record: &Record) -> Result<String, Error> {
     toml::to_string(&File::new(name, record)).map_err(Error::failed)
 }
@@ -336,7 +337,8 @@ mod tests {
             "format = 1\nname = \"x\"\ncommissioned = true\n[grip]\npressing_n = 6.0\nfriction = 0.35\n";
         let part = parse(gripped).expect("sound");
         assert!((part.device.limits.torque.0.to_num::<f64>() - 21.0).abs() < 1e-3);
-        // The shoulder at its scale asks for 2.86 N: refused before it starts. An adult's 1.0 N is fine.
+        // The shoulder at its scale asks for 2.86 N: refused before it starts. An adult's 1.0 N is
+        // fine.
         let refused =
             crate::profile::Profile::find_for("shoulder", &part.device).expect_err("too strong").to_string();
         assert!(refused.contains("N") && !refused.contains('\n'), "{refused}");

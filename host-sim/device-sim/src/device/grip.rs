@@ -1,11 +1,13 @@
-//! The force that the rollers hold: Paper 001 transmits force by the friction between two rollers and the needle, without loss "within maximum static
-//! frictional force". Beyond it the needle slips, and what the hand feels is friction instead of the law.
+//! The force that the rollers hold: Paper 001 transmits force by the friction between two rollers
+//! and the needle, without loss "within maximum static frictional force". Beyond it the needle
+//! slips, and what the hand feels is friction instead of the law.
 
 use control_core::Device;
 use fixed::types::I16F16;
 use serde::{Deserialize, Serialize};
 
-/// Grip and friction as a person measures them: how hard the rollers are pressed together, and what the needle needs to slide.
+/// Grip and friction as a person measures them: how hard the rollers are pressed together, and what
+/// the needle needs to slide.
 #[derive(Clone, Copy, Debug, PartialEq, Default, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Grip {
@@ -16,13 +18,14 @@ pub struct Grip {
 }
 
 impl Grip {
-    /// Largest force along the needle before it slips, N. Only the driven roller holds it; the other one turns freely.
+    /// Largest force along the needle before it slips, N. Only the driven roller holds it; the
+    /// other one turns freely.
     pub(crate) fn slips_at_n(self) -> f64 {
         self.pressing_n * self.friction
     }
 
-    /// Takes away torque that the rollers could not hold. `stated_mnm` is a ceiling that the file itself asks for: one above the
-    /// grip is refused, for somebody counted on it.
+    /// Takes away torque that the rollers could not hold. `stated_mnm` is a ceiling that the file
+    /// itself asks for: one above the grip is refused, for somebody counted on it.
     pub(super) fn bound(self, device: &mut Device, stated_mnm: Option<f64>) -> Result<(), String> {
         for (key, value, low, high) in
             [("pressing_n", self.pressing_n, 0.1, 200.0), ("friction", self.friction, 0.05, 2.0)]

@@ -1,4 +1,5 @@
-//! Ways to a device: the same bytes whether it is simulated in this process or hangs on a serial port.
+//! Ways to a device: the same bytes whether it is simulated in this process or hangs on a serial
+//! port.
 
 pub mod compensated;
 mod deformed;
@@ -12,8 +13,8 @@ use std::time::Duration;
 
 /// An open connection that carries bytes both ways.
 pub trait Wire: Send {
-    /// Reads what is there, waiting for at most `patience`; 0 bytes where nothing came. An error means that the connection is
-    /// permanently gone.
+    /// Reads what is there, waiting for at most `patience`; 0 bytes where nothing came. An error
+    /// means that the connection is permanently gone.
     fn read(&mut self, into: &mut [u8], patience: Duration) -> io::Result<usize>;
 
     /// Writes all of `bytes`, or fails: then the connection is permanently gone.

@@ -1,5 +1,6 @@
-//! The device without the hardware: the control core, tick by tick, against the plant, behind the same end of the link that
-//! the board has. It may not know who listens; it sees bytes, and a hand that somebody moves.
+//! The device without the hardware: the control core, tick by tick, against the plant, behind the
+//! same end of the link that the board has. It may not know who listens; it sees bytes, and a hand
+//! that somebody moves.
 
 use super::deformed::Deformed;
 use super::device_config::DeviceConfig;
@@ -19,12 +20,14 @@ use std::time::{Duration, Instant};
 
 /// One tick in s.
 const TICK_S: f64 = 1.0 / TICK_HZ as f64;
-/// Fastest that a dragged hand moves, mm/s: a quick reach, and well within what the encoder check allows.
+/// Fastest that a dragged hand moves, mm/s: a quick reach, and well within what the encoder check
+/// allows.
 const DRAG_MM_PER_S: f64 = 250.0;
 /// A dragged hand closes in on the mouse with this time constant, s.
 const DRAG_LAG_S: f64 = 0.04;
-/// Largest change of a dragged hand's speed: a firm stab. A mouse that jumps asks for more than a hand with a needle in tissue
-/// can do, and the device would take it for a motor that is wired the wrong way.
+/// Largest change of a dragged hand's speed: a firm stab. A mouse that jumps asks for more than a
+/// hand with a needle in tissue can do, and the device would take it for a motor that is wired the
+/// wrong way.
 const DRAG_MM_PER_S2: f64 = 3000.0;
 /// One tick in this many is timed: a look at the clock costs a quarter of a tick.
 const TIMED_TICKS: u64 = 16;
@@ -70,7 +73,8 @@ pub struct VirtualDevice {
 }
 
 impl VirtualDevice {
-    /// Powered down, the needle where `procedure` begins, the device configured as it leaves the bench: with the defaults.
+    /// Powered down, the needle where `procedure` begins, the device configured as it leaves the
+    /// bench: with the defaults.
     pub fn new(profile: &Profile, procedure: Procedure) -> Self {
         Self::built(profile, procedure, None)
     }
@@ -118,8 +122,8 @@ impl VirtualDevice {
         }
     }
 
-    /// Lets the law count depth from the surface of the deformed tissue instead of from where it was at rest: the law xr, on a patient with
-    /// a vessel and its far wall.
+    /// Lets the law count depth from the surface of the deformed tissue instead of from where it
+    /// was at rest: the law xr, on a patient with a vessel and its far wall.
     pub fn with_deformed(self, profile: &Profile) -> Result<Self, Error> {
         let deformed = Deformed::new(profile).map_err(Error::input)?;
         Ok(Self { deformed: Some(deformed), ..self })
@@ -193,7 +197,8 @@ impl VirtualDevice {
             self.controller.displace(displacement);
         }
         if self.enable && !self.powered_before && !matches!(self.hand, Hand::Drag { .. }) {
-            // The scripted hand waits for a person to start the device; a person who holds the needle goes on holding it.
+            // The scripted hand waits for a person to start the device; a person who holds the
+            // needle goes on holding it.
             self.restart_script();
         }
         self.powered_before = self.enable;
@@ -220,7 +225,8 @@ impl VirtualDevice {
         }
     }
 
-    /// The scripted hand does something else from now on, from its beginning; one that a person has taken it from waits with it.
+    /// The scripted hand does something else from now on, from its beginning; one that a person has
+    /// taken it from waits with it.
     pub fn follow(&mut self, procedure: Procedure) {
         self.procedure = procedure;
         if matches!(self.hand, Hand::Script { .. }) {
@@ -228,7 +234,8 @@ impl VirtualDevice {
         }
     }
 
-    /// Moves the simulated hand or the device. What concerns the control law goes over the link and not through here.
+    /// Moves the simulated hand or the device. What concerns the control law goes over the link and
+    /// not through here.
     pub fn control(&mut self, control: Control) {
         match control {
             Control::Drag { depth_mm } if depth_mm.is_finite() => {
@@ -321,7 +328,8 @@ impl VirtualDevice {
         std::mem::take(&mut self.done)
     }
 
-    /// The scripted hand turns the needle by what its procedure says, from wherever a person or the beginning has put it.
+    /// The scripted hand turns the needle by what its procedure says, from wherever a person or the
+    /// beginning has put it.
     fn turn(&mut self, turned_rad: f64) {
         if turned_rad != self.turned_rad {
             let tilt = self.plant.tilt() + turned_rad - self.turned_rad;

@@ -1,5 +1,6 @@
-//! The motor's winding in a device's file: what turns the amplifier's current into torque. The device itself only knows the torque at full
-//! scale, and a real one keeps nothing of this; the virtual device's motor is built from it.
+//! The motor's winding in a device's file: what turns the amplifier's current into torque. The
+//! device itself only knows the torque at full scale, and a real one keeps nothing of this; the
+//! virtual device's motor is built from it.
 
 use crate::plant::motor::Motor;
 use control_core::Device;
@@ -47,8 +48,9 @@ impl Winding {
         Ok(())
     }
 
-    /// Returns the motor: an RE25 wound otherwise. Resistance and inductance go with the square of the torque constant, as they do where
-    /// the same copper makes more turns of a thinner wire; the current loop keeps its bandwidth.
+    /// Returns the motor: an RE25 wound otherwise. Resistance and inductance go with the square of
+    /// the torque constant, as they do where the same copper makes more turns of a thinner wire;
+    /// the current loop keeps its bandwidth.
     pub fn motor(self, full_scale_torque: f64) -> Motor {
         let usual = Motor::re25(full_scale_torque);
         let torque_constant = self.torque_constant_mnm_per_a * 1e-3;

@@ -1,4 +1,5 @@
-//! From batches of 10 kHz samples and 1 kHz poses to what a picture needs with every picture. Pure: no clock, no socket.
+//! From batches of 10 kHz samples and 1 kHz poses to what a picture needs with every picture. Pure:
+//! no clock, no socket.
 
 use super::messages::{self, Bucket, Device, Range, Timing};
 use crate::session::{Batch, Hand, Happening, state_name, vessel_name};
@@ -6,7 +7,8 @@ use link::build::Build;
 use link::frames::{self, EventKind, Hello, Pose, Stage};
 use std::collections::BTreeMap;
 
-/// Length of a [`Bucket`] in ticks: 5 ms, so that 10 s are 2,000 of them, more than a plot has columns.
+/// Length of a [`Bucket`] in ticks: 5 ms, so that 10 s are 2,000 of them, more than a plot has
+/// columns.
 pub(crate) const BUCKET_TICKS: u64 = 50;
 /// Ticks a second until a device has said otherwise.
 const DEFAULT_TICK_HZ: u32 = control_core::TICK_HZ;
@@ -31,7 +33,8 @@ struct Ranges {
 }
 
 impl Condenser {
-    /// Returns the messages of `batch` for the page: the device, if it changed, and everything but who moves the needle.
+    /// Returns the messages of `batch` for the page: the device, if it changed, and everything but
+    /// who moves the needle.
     pub fn take(&mut self, mut batch: Batch) -> (Option<Device>, messages::Frame) {
         let device = batch.hello.take().map(|hello| self.begin(hello));
         self.notice_restart(&batch);
@@ -63,7 +66,8 @@ impl Condenser {
         device
     }
 
-    /// Ticks that begin again are another run, or another place of a recording: what is half done of the old one is dropped.
+    /// Ticks that begin again are another run, or another place of a recording: what is half done
+    /// of the old one is dropped.
     fn notice_restart(&mut self, batch: &Batch) {
         let jumps = batch.link.replay.map_or(0, |replay| replay.jumps);
         let jumped = std::mem::replace(&mut self.jumps, jumps) != jumps;

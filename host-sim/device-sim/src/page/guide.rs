@@ -1,4 +1,5 @@
-//! The state that a guide shows and the answers of its page: the steps of work that a person and a device do in turns.
+//! The state that a guide shows and the answers of its page: the steps of work that a person and a
+//! device do in turns.
 
 use serde::{Deserialize, Serialize};
 
@@ -57,7 +58,8 @@ struct End {
 #[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(tag = "do", rename_all = "snake_case", deny_unknown_fields)]
 pub enum GuideAnswer {
-    /// Begin the step of this number, counted from 1. One that was asked before, or never, is ignored.
+    /// Begin the step of this number, counted from 1. One that was asked before, or never, is
+    /// ignored.
     Begin {
         /// The step's number.
         step: usize,

@@ -1,8 +1,11 @@
-//! Everything that server and page say to each other: JSON texts over the WebSocket at `/live`, one message a text.
+//! Everything that server and page say to each other: JSON texts over the WebSocket at `/live`, one
+//! message a text.
 //!
-//! After connecting the page gets a `scene`, a `patient` where it may be changed, a `device` as soon as the device has said who it is, and then a `frame`
-//! every 8 ms, every 250 ms while nothing arrives from the device, less often where the page is slow. The page sends a [`Control`](crate::session::Control) when a
-//! person does something. Times are seconds of the device's own clock, lengths are along the needle.
+//! After connecting the page gets a `scene`, a `patient` where it may be changed, a `device` as
+//! soon as the device has said who it is, and then a `frame` every 8 ms, every 250 ms while nothing
+//! arrives from the device, less often where the page is slow. The page sends a
+//! [`Control`](crate::session::Control) when a person does something. Times are seconds of the
+//! device's own clock, lengths are along the needle.
 
 use crate::session::{Hand, LinkStatus, PatientStatus, Scene};
 use serde::Serialize;
@@ -11,7 +14,8 @@ use serde::Serialize;
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(tag = "type", rename_all = "snake_case")]
 pub enum ToPage {
-    /// The scene; at the beginning, and again with each other patient. Its fields are those of [`Scene`].
+    /// The scene; at the beginning, and again with each other patient. Its fields are those of
+    /// [`Scene`].
     Scene(Scene),
     /// The patient, where it may be changed; again with the answer to each wish.
     Patient(PatientStatus),
@@ -81,7 +85,8 @@ pub struct Pose {
     pub speed_mm_s: f64,
     /// The force that the control core computed, in N, positive when it resists insertion.
     pub force_n: f64,
-    /// The motor's force at the needle after all limits, from the converter's code; in N, with the same sign.
+    /// The motor's force at the needle after all limits, from the converter's code; in N, with the
+    /// same sign.
     pub motor_n: f64,
     /// The motor's torque in mN·m, positive in the insertion direction.
     pub torque_mnm: f64,
@@ -89,19 +94,22 @@ pub struct Pose {
     pub tilt_rad: f64,
     /// Angle to the skin that the layers are met at, smoothed, in rad.
     pub angle_rad: f64,
-    /// The tip's place relative to the vessel: `outside`, `touching`, `in_lumen`, `through`, `beside` or `unknown`.
+    /// The tip's place relative to the vessel: `outside`, `touching`, `in_lumen`, `through`,
+    /// `beside` or `unknown`.
     pub vessel: &'static str,
     /// The force across the needle that would hold its direction, in N; no motor gives it.
     pub lateral_n: f64,
-    /// `idle`, `approach`, `elastic`, `puncture`, `friction`, `withdrawal`, `excitation`, `fault` or `unknown`.
+    /// `idle`, `approach`, `elastic`, `puncture`, `friction`, `withdrawal`, `excitation`, `fault`
+    /// or `unknown`.
     pub state: &'static str,
-    /// Limits in force, a bit each: 1 torque, 2 slew, 4 fade-in, 8 thermal, 16 passivity, 32 estimated.
+    /// Limits in force, a bit each: 1 torque, 2 slew, 4 fade-in, 8 thermal, 16 passivity, 32
+    /// estimated.
     pub limits: u8,
 }
 
-/// All samples and poses of 5 ms: `[t_s, [depth low, high], [law low, high], [motor low, high]]` in s, mm and N, `t_s` being
-/// where the 5 ms begin.
-/// Null where nothing was known. Extremes are kept, so that no spike is lost on the way to the plot.
+/// All samples and poses of 5 ms: `[t_s, [depth low, high], [law low, high], [motor low, high]]` in
+/// s, mm and N, `t_s` being where the 5 ms begin. Null where nothing was known. Extremes are kept,
+/// so that no spike is lost on the way to the plot.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Bucket(pub f64, pub Range, pub Range, pub Range);
 
@@ -122,7 +130,8 @@ impl Range {
 pub struct Event {
     /// Its time, in s.
     pub t_s: f64,
-    /// `contact`, `puncture`, `vessel`, `exit`, `fault`, `limits`, `started`, `stopped`, `flashback`, `far_wall`, `barrier` or `other`.
+    /// `contact`, `puncture`, `vessel`, `exit`, `fault`, `limits`, `started`, `stopped`,
+    /// `flashback`, `far_wall`, `barrier` or `other`.
     pub kind: &'static str,
     /// The layer it is about, outermost 0.
     pub layer: Option<u8>,

@@ -1,4 +1,5 @@
-//! Friction of a bearing: viscous, dry, and a breakaway that is higher than the dry friction of motion.
+//! Friction of a bearing: viscous, dry, and a breakaway that is higher than the dry friction of
+//! motion.
 
 /// Friction coefficients of a bearing.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,8 +41,9 @@ impl Bearing {
 impl BearingStep {
     /// The speed after a step under `torque` N·m.
     ///
-    /// Dry friction is an impulse that can stop the bearing and never turn it round (time stepping after Moreau): it sticks at
-    /// exactly zero, takes energy only, and does not chatter whatever the step.
+    /// Dry friction is an impulse that can stop the bearing and never turn it round (time stepping
+    /// after Moreau): it sticks at exactly zero, takes energy only, and does not chatter whatever
+    /// the step.
     #[inline]
     pub fn step(&self, speed: f64, torque: f64) -> f64 {
         // Viscous friction implicitly: stable for any coefficient.

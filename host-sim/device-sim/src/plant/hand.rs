@@ -1,4 +1,5 @@
-//! A hand on the needle: a spring and a damper towards where it wants the tip, and physiological tremor (8–12 Hz).
+//! A hand on the needle: a spring and a damper towards where it wants the tip, and physiological
+//! tremor (8–12 Hz).
 
 use std::f64::consts::TAU;
 
@@ -105,7 +106,8 @@ impl Hand {
     }
 }
 
-/// SplitMix64 (Steele, Lea and Flood 2014): the same numbers on every machine and with every release.
+/// SplitMix64 (Steele, Lea and Flood 2014): the same numbers on every machine and with every
+/// release.
 struct SplitMix(u64);
 
 impl SplitMix {

@@ -1,9 +1,11 @@
-//! The physics that the device meets, in floating point and steps finer than the tick: amplifier and motor, roller on its
-//! bearings, a needle held by the grip of the roller, its weight, a hand. SI units; positive is the insertion direction.
+//! The physics that the device meets, in floating point and steps finer than the tick: amplifier
+//! and motor, roller on its bearings, a needle held by the grip of the roller, its weight, a hand.
+//! SI units; positive is the insertion direction.
 //!
-//! It knows a converter's set value, an enable line and an encoder count, and nothing of force laws: tissue exists only as
-//! the torque that the control law asks for. The same inputs give the same bits, always and on every machine, in a browser
-//! too: sines come from `libm`, not from the system.
+//! It knows a converter's set value, an enable line and an encoder count, and nothing of force
+//! laws: tissue exists only as the torque that the control law asks for. The same inputs give the
+//! same bits, always and on every machine, in a browser too: sines come from `libm`, not from the
+//! system.
 
 pub mod bearing;
 pub mod hand;
@@ -62,8 +64,8 @@ impl PlantConfig {
     }
 }
 
-/// A quantity that has decayed below anything physical is zero: left alone it would end among the subnormal numbers, where
-/// every operation costs a hundred times as much.
+/// A quantity that has decayed below anything physical is zero: left alone it would end among the
+/// subnormal numbers, where every operation costs a hundred times as much.
 #[inline]
 fn settled(x: f64) -> f64 {
     if x.abs() < 1e-30 { 0.0 } else { x }
@@ -95,7 +97,8 @@ pub struct Plant {
 }
 
 impl Plant {
-    /// At rest with the tip at `tip` (m past the skin), where the encoder has counted from the skin.
+    /// At rest with the tip at `tip` (m past the skin), where the encoder has counted from the
+    /// skin.
     pub fn new(config: PlantConfig, grip: Grip, tip: f64) -> Self {
         Self {
             amplifier: Amplifier::default(),
@@ -126,9 +129,9 @@ impl Plant {
         self.tilt
     }
 
-    /// Moves time on by one tick: 100 µs. `set_value` is the amplifier's input as a share of full scale, −1 to 1; `enable` its
-    /// enable line. `hand` is where the hand wants the tip at the start of the tick (m) and how fast (m/s), or `None` where it
-    /// has let go.
+    /// Moves time on by one tick: 100 µs. `set_value` is the amplifier's input as a share of full
+    /// scale, −1 to 1; `enable` its enable line. `hand` is where the hand wants the tip at the
+    /// start of the tick (m) and how fast (m/s), or `None` where it has let go.
     pub fn tick(&mut self, set_value: f64, enable: bool, hand: Option<(f64, f64)>) {
         let tremor = self.hand.tremor_tick();
         let mut hand = hand.map(|(place, speed)| (place + tremor.0, speed + tremor.1));

@@ -1,4 +1,5 @@
-//! A DC motor behind a servo amplifier in current mode: electrical pole, supply and current limits, enable line.
+//! A DC motor behind a servo amplifier in current mode: electrical pole, supply and current limits,
+//! enable line.
 
 use super::{STEP_S, settled};
 
@@ -22,7 +23,8 @@ pub struct Motor {
 }
 
 impl Motor {
-    /// A 24 V winding of RE25 class behind a four-quadrant amplifier with a current loop of about 1 kHz.
+    /// A 24 V winding of RE25 class behind a four-quadrant amplifier with a current loop of about 1
+    /// kHz.
     pub fn re25(full_scale_torque: f64) -> Self {
         Self {
             resistance: 2.32,
@@ -51,8 +53,8 @@ impl Motor {
 }
 
 impl Amplifier {
-    /// One physics step; the torque in N·m. `wanted` is the current asked for in A, or `None` where the enable line is low;
-    /// `speed` the rotor's in rad/s.
+    /// One physics step; the torque in N·m. `wanted` is the current asked for in A, or `None` where
+    /// the enable line is low; `speed` the rotor's in rad/s.
     #[inline]
     pub fn step(&mut self, motor: &Motor, wanted: Option<f64>, speed: f64) -> f64 {
         let back = motor.torque_constant * speed;
@@ -62,7 +64,8 @@ impl Amplifier {
             let voltage = motor.current_gain * (wanted - self.current) + drop;
             self.current = settled(self.current + rate * (voltage.clamp(-motor.supply, motor.supply) - drop));
         } else {
-            // The bridge is open: current decays through the diodes against the supply and does not turn round.
+            // The bridge is open: current decays through the diodes against the supply and does not
+            // turn round.
             let fall = rate * (motor.supply + motor.resistance * self.current.abs());
             self.current = self.current.signum() * (self.current.abs() - fall).max(0.0);
         }

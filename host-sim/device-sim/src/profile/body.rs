@@ -1,5 +1,6 @@
-//! `[body]` of a patient: a site in three dimensions with a point of entry, a direction and the turn of the limb. The layers of the file
-//! then say what each tissue feels like, and the line through the body says which are met and where.
+//! `[body]` of a patient: a site in three dimensions with a point of entry, a direction and the
+//! turn of the limb. The layers of the file then say what each tissue feels like, and the line
+//! through the body says which are met and where.
 
 use super::{File, Layer, Profile, TissueName};
 use crate::error::Error;
@@ -11,7 +12,8 @@ use serde::Deserialize;
 
 /// Thinner pieces of a line are not told to the device, mm.
 const THINNEST_MM: f64 = 0.2;
-/// The length of the needle's line that is asked for layers, mm: within the device's travel, a wall's puncture included.
+/// The length of the needle's line that is asked for layers, mm: within the device's travel, a
+/// wall's puncture included.
 const REACH_MM: f64 = 55.0;
 /// Thickness that fat may have, mm.
 const FAT_MM: [f64; 2] = [1.0, 60.0];
@@ -61,7 +63,8 @@ pub struct InBody {
 }
 
 impl Written {
-    /// Returns the body for a needle that is inclined by `incline_deg`; `fat_mm` if the patient's own figures say how thick the fat is.
+    /// Returns the body for a needle that is inclined by `incline_deg`; `fat_mm` if the patient's
+    /// own figures say how thick the fat is.
     pub(super) fn resolve(&self, incline_deg: f64, fat_mm: Option<f64>) -> Result<InBody, String> {
         let site = match self.site {
             SiteName::Shoulder => Site::Shoulder,
@@ -117,8 +120,9 @@ fn tissue_name(tissue: Tissue) -> TissueName {
 }
 
 impl InBody {
-    /// Returns the layers along the line, each with the forces of the file's layer of its tissue and its depth for a needle of this inclination,
-    /// and notes their names. The device holds six: past the sixth the needle goes on in it.
+    /// Returns the layers along the line, each with the forces of the file's layer of its tissue
+    /// and its depth for a needle of this inclination, and notes their names. The device holds six:
+    /// past the sixth the needle goes on in it.
     pub(super) fn layers(&mut self, kinds: &[Layer]) -> Result<Vec<Layer>, String> {
         let of = |tissue: TissueName| kinds.iter().find(|layer| layer.tissue == tissue);
         if let Some(missing) =
@@ -195,7 +199,8 @@ impl InBody {
 }
 
 impl Profile {
-    /// The same patient with other numbers in its file, at its top and in its `[body]`: what the line through a body meets follows from them.
+    /// The same patient with other numbers in its file, at its top and in its `[body]`: what the
+    /// line through a body meets follows from them.
     pub fn with_keys(&self, top: &[(&str, f64)], body: &[(&str, f64)]) -> Result<Self, Error> {
         let unreadable =
             |cause: &dyn std::fmt::Display| Error::input(format_args!("{}: {cause}", self.source.origin));
@@ -217,7 +222,8 @@ impl Profile {
 }
 
 impl File {
-    /// Replaces the layers, which say what each tissue feels like, by those that the needle's line meets in the body, if there is one.
+    /// Replaces the layers, which say what each tissue feels like, by those that the needle's line
+    /// meets in the body, if there is one.
     pub(super) fn take_body(&mut self) -> Result<Option<InBody>, String> {
         let Some(written) = self.body else { return Ok(None) };
         if self.force_table.is_some() || self.vessel.is_some() || !self.beside.is_empty() {
@@ -256,7 +262,8 @@ mod tests {
         layers.map(|(layer, number)| (name(number), layer.depth.0.to_num::<f64>() / sine)).collect()
     }
 
-    /// At any inclination the device meets each structure at the same mm along the needle as the line does.
+    /// At any inclination the device meets each structure at the same mm along the needle as the
+    /// line does.
     #[test]
     fn the_devices_layers_are_those_of_the_line() {
         for (name, degrees) in [("forearm", 25.0), ("shoulder-joint", 45.0), ("hip", 80.0), ("knee", 45.0)] {

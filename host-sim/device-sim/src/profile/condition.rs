@@ -1,5 +1,5 @@
-//! The forces of a patient's age and illness. None of the three papers gives a number, so each rule here is an assumption of ours, and a
-//! key that would change nothing is refused.
+//! The forces of a patient's age and illness. None of the three papers gives a number, so each rule
+//! here is an assumption of ours, and a key that would change nothing is refused.
 
 use super::{Layer, Person, TissueName};
 
@@ -7,11 +7,12 @@ use super::{Layer, Person, TissueName};
 const AGE_YEARS: f64 = 50.0;
 /// Ages beyond which the skin changes no more, years.
 const AGES_YEARS: [f64; 2] = [20.0, 90.0];
-/// Share of the skin's forces that is lost each year. An assumption: the skin gives way at 1.0 N in the profile `adult`, taken as 50 years
-/// old, and at 0.7 N in `thin-elderly`, taken as 80.
+/// Share of the skin's forces that is lost each year. An assumption: the skin gives way at 1.0 N in
+/// the profile `adult`, taken as 50 years old, and at 0.7 N in `thin-elderly`, taken as 80.
 const LOST_PER_YEAR: f64 = 0.01;
 
-/// The largest compliance that the device takes, mm²/N: a wall as soft as that gives 1 mN after 1 mm, and may not become softer.
+/// The largest compliance that the device takes, mm²/N: a wall as soft as that gives 1 mN after 1
+/// mm, and may not become softer.
 const SOFTEST_MM2_PER_N: f64 = 1000.0;
 /// The least stiffness of a wall that is drawn back from, N/mm.
 const SOFTEST_N_PER_MM: f64 = 0.05;
@@ -32,8 +33,8 @@ const PATHOLOGIES: [Pathology; 2] = [
     Pathology { name: "scleroderma", tissues: &[TissueName::Skin], factor: 1.5 },
 ];
 
-/// Scales the forces of `layers` as age and illness say. A key of the person that changes nothing is an error; `by_table` is true if the
-/// forces come from a table, which nothing of this changes.
+/// Scales the forces of `layers` as age and illness say. A key of the person that changes nothing
+/// is an error; `by_table` is true if the forces come from a table, which nothing of this changes.
 pub(super) fn apply(layers: &mut [Layer], person: &Person, by_table: bool) -> Result<(), String> {
     check_body(layers, person)?;
     if let Some(age_years) = person.age_years {
@@ -100,10 +101,11 @@ fn scale_layer(layer: &mut Layer, factor: f64) -> bool {
     layer.wall.is_some() || layer.cutting.is_some()
 }
 
-/// Returns the compliance at which a wall gives `factor` times the force. One at the softest stays there.
+/// Returns the compliance at which a wall gives `factor` times the force. One at the softest stays
+/// there.
 fn scaled_compliance(compliance_mm2_per_n: f64, factor: f64) -> f64 {
     let scaled = compliance_mm2_per_n / factor;
-    // What is out of range in the file is refused as it stands there.
+    // What is out of range in the file is refused with the value in the file.
     if compliance_mm2_per_n <= SOFTEST_MM2_PER_N { scaled.min(SOFTEST_MM2_PER_N) } else { scaled }
 }
 

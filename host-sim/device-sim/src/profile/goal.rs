@@ -7,7 +7,8 @@ use control_core::Patient;
 use control_core::config::{self, Tissue};
 use serde::Deserialize;
 
-/// A structure to be reached. Layers of the device go on for ever: where it ends to either side, that is for whoever judges.
+/// A structure to be reached. Layers of the device go on for ever: where it ends to either side,
+/// that is for whoever judges.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Goal {
     /// Its name.
@@ -18,7 +19,8 @@ pub struct Goal {
     pub has_wall: bool,
     /// The layer below, and whether that has a wall.
     pub below: Option<(u8, bool)>,
-    /// From where to where it reaches along the skin, mm from the point of entry; none where it goes on for ever.
+    /// From where to where it reaches along the skin, mm from the point of entry; none where it
+    /// goes on for ever.
     pub reach_mm: Option<(f64, f64)>,
 }
 
@@ -57,8 +59,9 @@ impl Written {
 /// The number of a layer that the needle's line does not meet.
 const NOT_MET: u8 = u8::MAX;
 
-/// Returns the goal of the file, else the lumen of the vessel. Without such a layer there is none, or, where `may_miss` because the line
-/// through a body need not meet it, one that cannot be reached.
+/// Returns the goal of the file, else the lumen of the vessel. Without such a layer there is none,
+/// or, where `may_miss` because the line through a body need not meet it, one that cannot be
+/// reached.
 pub(super) fn goal(
     written: Option<Written>,
     patient: &Patient,

@@ -1,5 +1,6 @@
-//! The `[law]` of a profile and what it needs elsewhere in the file: which law of force counts, with its own numbers. Numbers
-//! are only taken over here; whether they may run is the control law's to say.
+//! The `[law]` of a profile and what it needs elsewhere in the file: which law of force counts,
+//! with its own numbers. Numbers are only taken over here; whether they may run is the control
+//! law's to say.
 
 use super::{Layer, fix};
 use control_core::config::{
@@ -55,7 +56,8 @@ impl Model {
     }
 }
 
-/// Share of the cutting force that is left where a wall has just given way; an assumption where it is left out: the paper gives none.
+/// Share of the cutting force that is left where a wall has just given way; an assumption where it
+/// is left out: the paper gives none.
 fn after_puncture() -> f64 {
     0.6
 }
@@ -64,7 +66,7 @@ fn after_puncture() -> f64 {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields, tag = "model", rename_all = "kebab-case")]
 pub(super) enum Table {
-    /// Its friction stands in `[friction]`.
+    /// Its friction is in `[friction]`.
     Jog {},
     /// The polynomials of its walls and the forces of cutting stand in the layers.
     Sparte {
@@ -75,7 +77,7 @@ pub(super) enum Table {
         friction: Bristles,
         fixture: Direction,
     },
-    /// Its table stands in `[force_table]`, as `fit-force` writes it.
+    /// Its table is in `[force_table]`, as `fit-force` writes it.
     Xr { stiffness_n_per_mm: f64, withdrawal: f64 },
 }
 
@@ -153,8 +155,8 @@ pub(super) struct Cut {
     pub(super) outwards_n: f64,
 }
 
-/// The law that a file's parts make, or in a sentence which key is missing or too many. Without a `[friction]`, the jog law
-/// keeps `usual`.
+/// The law that a file's parts make, or in a sentence which key is missing or too many. Without a
+/// `[friction]`, the jog law keeps `usual`.
 pub(super) fn law(
     table: Option<&Table>,
     friction: Option<&Friction>,
@@ -322,7 +324,8 @@ impl Forces {
 }
 
 impl Forces {
-    /// Returns the depth of each of `count` knots in hundredths of a mm, in the order of the forces, or once for all cells.
+    /// Returns the depth of each of `count` knots in hundredths of a mm, in the order of the
+    /// forces, or once for all cells.
     fn depths(&self, count: usize) -> Result<Vec<u16>, String> {
         if let Some(step) = self.depth_step_mm.filter(|step| !step.is_finite()) {
             return Err(format!("depth_step_mm is {step}; it must be a number"));

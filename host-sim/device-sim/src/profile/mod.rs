@@ -1,6 +1,6 @@
-//! A patient, as a person writes one (TOML, decimal numbers with their unit in the key), and as the control law takes it
-//! ([`Patient`], fixed point). Nothing of the device stands in it: that is `crate::device::device_config`. What the control law
-//! refuses is refused here too.
+//! A patient, as a person writes one (TOML, decimal numbers with their unit in the key), and as the
+//! control law takes it ([`Patient`], fixed point). It holds nothing of the device: that is
+//! `crate::device::device_config`. What the control law refuses is refused here too.
 
 mod beside;
 mod body;
@@ -228,7 +228,8 @@ fn check_angle(key: &str, degrees: f64) -> Result<(), String> {
     }
 }
 
-/// Depth in mm along a needle at `angle_rad` to the skin at which the wall of `layer` gives way, where it has one.
+/// Depth in mm along a needle at `angle_rad` to the skin at which the wall of `layer` gives way,
+/// where it has one.
 pub(crate) fn puncture_path_mm(layer: &config::Layer, angle_rad: f64) -> Option<f64> {
     let wall = layer.wall?;
     Some(layer.depth.0.to_num::<f64>() / libm::sin(angle_rad) + wall.puncture_travel.0.to_num::<f64>())
@@ -278,7 +279,7 @@ struct Layer {
     tissue: TissueName,
     /// True if the needle must avoid it; by default as in Paper 002, tendon and cartilage.
     spare: Option<bool>,
-    /// Perpendicular to the skin; in a body it follows from the line and stands in no file.
+    /// Perpendicular to the skin; in a body it follows from the line and is in no file.
     depth_mm: Option<f64>,
     /// The rule for its thickness; the layers below move with it.
     thickness: Option<Thickness>,

@@ -1,4 +1,5 @@
-//! The `[patient]` of a profile: the person. The control law knows none of it: thicknesses follow from it here, forces in `condition`.
+//! The `[patient]` of a profile: the person. The control law knows none of it: thicknesses follow
+//! from it here, forces in `condition`.
 
 use super::Layer;
 use serde::Deserialize;
@@ -67,13 +68,14 @@ pub enum Difficulty {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub(super) enum Thickness {
-    /// The superficial fat of the posterior arm by ultrasound, for each class of body mass index and sex. Cotofana et al. 2020,
-    /// J Drugs Dermatol 19(1):36.
+    /// The superficial fat of the posterior arm by ultrasound, for each class of body mass index
+    /// and sex. Cotofana et al. 2020, J Drugs Dermatol 19(1):36.
     ByBodyMass,
 }
 
 impl Thickness {
-    /// Returns the thickness for this patient, mm; an error if the patient's file does not say enough.
+    /// Returns the thickness for this patient, mm; an error if the patient's file does not say
+    /// enough.
     pub(super) fn of_mm(self, person: &Person) -> Result<f64, String> {
         let Self::ByBodyMass = self;
         let missing = || "thickness by-body-mass needs patient.sex, weight_kg and height_cm".to_owned();
@@ -87,7 +89,8 @@ impl Thickness {
     }
 }
 
-/// Returns the depth of each layer, mm: as its key says, unless the patient sets the thickness of one above it.
+/// Returns the depth of each layer, mm: as its key says, unless the patient sets the thickness of
+/// one above it.
 pub(super) fn depths_mm(layers: &[Layer], person: &Person) -> Result<Vec<f64>, String> {
     let (mut depths_mm, mut moved_mm) = (Vec::new(), 0.0);
     for (number, layer) in layers.iter().enumerate() {

@@ -1,4 +1,5 @@
-//! Depths at which the layers of a force table give way, for pictures and procedures: the control law finds it by itself.
+//! Depths at which the layers of a force table give way, for pictures and procedures: the control
+//! law finds it by itself.
 
 use control_core::Patient;
 use control_core::config::{ForceTable, Law};
@@ -14,7 +15,8 @@ pub(super) struct Rupture {
     pub(super) force_n: f64,
 }
 
-/// Returns the ruptures of a needle at this angle to the skin and the middle one of the table's speeds; none of a law without a table.
+/// Returns the ruptures of a needle at this angle to the skin and the middle one of the table's
+/// speeds; none of a law without a table.
 pub(super) fn ruptures(patient: &Patient, angle_rad: f64) -> Vec<Rupture> {
     let Law::Xr(table) = &patient.law else { return Vec::new() };
     let cell = nearest_cell(table, angle_rad);

@@ -1,11 +1,13 @@
-//! The requests of a person to a running device, as the page sends them. Data only: nothing here waits or sends.
+//! The requests of a person to a running device, as the page sends them. Data only: nothing here
+//! waits or sends.
 
 use super::messages::ProbeView;
 use crate::named_files::is_file_name;
 use crate::procedure::task::is_name as is_task_name;
 use serde::{Deserialize, Serialize};
 
-/// A request of a person; `do` names the variant in the JSON that a page sends, e.g. `{"do":"drag","depth_mm":3.2}`.
+/// A request of a person; `do` names the variant in the JSON that a page sends, e.g.
+/// `{"do":"drag","depth_mm":3.2}`.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(tag = "do", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Control {
@@ -39,8 +41,8 @@ pub enum Control {
         /// Key by key as in a profile's file.
         profile: serde_json::Value,
     },
-    /// The patient as a person has edited it, to be kept under a name. An older one is never replaced: `anna` becomes `anna-2` where
-    /// there is one.
+    /// The patient as a person has edited it, to be kept under a name. An older one is never
+    /// replaced: `anna` becomes `anna-2` where there is one.
     SavePatient {
         /// Name of the file without folder and ending, as that of a recording.
         name: String,
@@ -52,14 +54,16 @@ pub enum Control {
         /// Share of what the device has stored, 0 to 1.
         share: f64,
     },
-    /// Record from now on. An older file is never replaced: `monday` becomes `monday-2` where there is one.
+    /// Record from now on. An older file is never replaced: `monday` becomes `monday-2` where there
+    /// is one.
     Record {
         /// Name of the file without folder and ending: 1 to 60 letters, digits, blanks or `._-`.
         name: String,
     },
     /// End the recording.
     EndRecording,
-    /// The probe has been moved, or its image shows another part of the needle; at most ten times a second.
+    /// The probe has been moved, or its image shows another part of the needle; at most ten times a
+    /// second.
     Probe(ProbeView),
     /// A task of the procedure has been done.
     Task {

@@ -9,7 +9,8 @@ use serde::{Deserialize, Serialize};
 /// An older pose says nothing of where the needle was at an event: 100 ms.
 const NEAR_TICKS: u64 = control_core::TICK_HZ as u64 / 10;
 
-/// Something that happened, and where the needle was just before: after a puncture the force has already dropped.
+/// Something that happened, and where the needle was just before: after a puncture the force has
+/// already dropped.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Happening {
     /// The event.
@@ -73,13 +74,15 @@ pub struct LinkStatus {
     pub recording: Option<RecordingStatus>,
     /// The file of the last recording that was ended in the page.
     pub recorded: Option<String>,
-    /// A notice for a person: why there is no connection, why a command was refused, why recording ended.
+    /// A notice for a person: why there is no connection, why a command was refused, why recording
+    /// ended.
     pub notice: Option<String>,
     /// The position in a recording that is played.
     pub replay: Option<ReplayStatus>,
     /// The share of the device's compensation in force, 0 to 1; none where it compensates nothing.
     pub compensation: Option<f64>,
-    /// Samples that the one who is told this was too slow for; they are in the recording all the same.
+    /// Samples that the one who is told this was too slow for; they are in the recording all the
+    /// same.
     pub skipped_samples: u64,
 }
 

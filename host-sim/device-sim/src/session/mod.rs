@@ -1,5 +1,6 @@
-//! A running device (virtual, serial or a replayed recording) as whoever looks at it sees it: what arrives, in batches, and
-//! the few things a person may ask. Nothing here touches bytes, the plant or the disk.
+//! A running device (virtual, serial or a replayed recording) as whoever looks at it sees it: what
+//! arrives, in batches, and the few things a person may ask. Nothing here touches bytes, the plant
+//! or the disk.
 
 mod control;
 mod messages;
@@ -100,8 +101,8 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Appends, dropping the oldest beyond `limit`; returns how many were dropped. A jump may have left more than `limit` waiting, which
-/// then stays that long until it is read.
+/// Appends, dropping the oldest beyond `limit`; returns how many were dropped. A jump may have left
+/// more than `limit` waiting, which then stays that long until it is read.
 fn append<T: Clone>(queue: &mut VecDeque<T>, new: &[T], limit: usize) -> u64 {
     let limit = limit.max(queue.len());
     queue.extend(new.iter().cloned());
@@ -149,7 +150,8 @@ impl Session {
 }
 
 impl Subscription {
-    /// All since the last drain; never blocks for long. A slow looker loses the oldest, and the loss is counted.
+    /// All since the last drain; never blocks for long. A slow looker loses the oldest, and the
+    /// loss is counted.
     pub fn drain(&mut self) -> Batch {
         let taken = {
             let mut buffer = lock(&self.buffer);
@@ -203,7 +205,8 @@ impl Publisher {
         });
     }
 
-    /// A pose. An event overtakes the poses of its own millisecond: the last ones may still learn from it.
+    /// A pose. An event overtakes the poses of its own millisecond: the last ones may still learn
+    /// from it.
     pub fn pose(&self, pose: Pose) {
         {
             let mut state = lock(&self.hub.state);
@@ -235,7 +238,8 @@ impl Publisher {
         self.each(|buffer| buffer.hello = Some(hello.clone()));
     }
 
-    /// Time has jumped: what waits for lookers, and what happened, is that of another place; this comes instead, however long.
+    /// Time has jumped: what waits for lookers, and what happened, is that of another place; this
+    /// comes instead, however long.
     pub fn jump(&self, samples: &[(u64, Sample)], poses: &[Pose], events: &[Event]) {
         let mut happenings: VecDeque<_> =
             events.iter().map(|event| Happening { event: *event, before: None }).collect();

@@ -1,10 +1,12 @@
-//! The scene that a picture shows before anything moves, and the names of its parts. It does not change while the session runs.
+//! The scene that a picture shows before anything moves, and the names of its parts. It does not
+//! change while the session runs.
 
 use control_core::config::Tissue;
 use control_core::event::{State, VesselState};
 use serde::Serialize;
 
-/// The scene that a picture shows before anything moves. Depths of layers are perpendicular to the skin.
+/// The scene that a picture shows before anything moves. Depths of layers are perpendicular to the
+/// skin.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Scene {
     /// The source of the samples.
@@ -21,11 +23,13 @@ pub struct Scene {
     pub travel_mm: f64,
     /// Largest force at the roller in N.
     pub largest_force_n: f64,
-    /// Share of the law's forces that the hand gets, where the motor is too weak for all of them: a pose's `force_n` times this is felt.
+    /// Share of the law's forces that the hand gets, where the motor is too weak for all of them: a
+    /// pose's `force_n` times this is felt.
     pub force_scale: f64,
     /// Inclination below the horizontal that the procedure begins with, in rad.
     pub tilt_rad: f64,
-    /// Inclination of the needle laid on the skin, in rad; the angle to the skin is what is left of the tilt.
+    /// Inclination of the needle laid on the skin, in rad; the angle to the skin is the rest of the
+    /// tilt.
     pub skin_tilt_rad: f64,
     /// The vessel, where there is one with two walls.
     pub vessel: Option<SceneVessel>,
@@ -36,7 +40,8 @@ pub struct Scene {
     pub beside: Vec<SceneBeside>,
     /// The needle, the same for every picture.
     pub needle: SceneNeedle,
-    /// True if [`super::Control::Drag`], [`super::Control::Tilt`] and [`super::Control::Demo`] have an effect: only with the virtual device.
+    /// True if [`super::Control::Drag`], [`super::Control::Tilt`] and [`super::Control::Demo`] have
+    /// an effect: only with the virtual device.
     pub hand: bool,
 }
 
@@ -92,7 +97,8 @@ pub struct SceneBody {
     pub fat_mm: f64,
     /// From where to where along the limb a needle may enter, in mm.
     pub reach_mm: [f64; 2],
-    /// The direction of length 1 into the body perpendicular to the skin at entry: along the needle's plane, across it, down.
+    /// The direction of length 1 into the body perpendicular to the skin at entry: along the
+    /// needle's plane, across it, down.
     pub inwards: [f64; 3],
     /// The section along the needle's plane, in the order in which it is painted.
     pub outlines: Vec<SceneOutline>,
@@ -124,7 +130,8 @@ pub struct SceneBeside {
     pub height_mm: f64,
 }
 
-/// A hypodermic needle of 21 gauge. Its hub sits at the end of the cannula, so that the needle goes in until the hub meets the skin.
+/// A hypodermic needle of 21 gauge. Its hub sits at the end of the cannula, so that the needle goes
+/// in until the hub meets the skin.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct SceneNeedle {
     /// Length of the cannula from the tip to the hub in mm.
@@ -145,7 +152,8 @@ const LENGTHS_MM: [f64; 5] = [25.0, 32.0, 38.0, 50.0, 80.0];
 const OUTSIDE_MM: f64 = 8.0;
 
 impl SceneNeedle {
-    /// The shortest needle that reaches `depth_mm` along itself with some of it left outside; the longest where none does.
+    /// The shortest needle that reaches `depth_mm` along itself with some of it left outside; the
+    /// longest where none does.
     pub fn reaching(depth_mm: f64) -> Self {
         let reaches = |length: &f64| *length >= depth_mm + OUTSIDE_MM;
         let length_mm = LENGTHS_MM.into_iter().find(reaches).unwrap_or(LENGTHS_MM[LENGTHS_MM.len() - 1]);

@@ -59,7 +59,8 @@ fn late_subscribers_get_the_same_state_and_dropped_ones_go() {
     let pose = |tick| publisher.pose(Pose { tick, ..Pose::default() });
     let event = |tick| publisher.event(Event { tick, kind: EventKind::Puncture { layer: 0 } });
     pose(10);
-    // It overtakes the pose of its millisecond, and the pose of its own tick is from after the drop.
+    // It overtakes the pose of its millisecond, and the pose of its own tick is from after the
+    // drop.
     event(30);
     pose(20);
     pose(30);

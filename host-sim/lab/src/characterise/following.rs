@@ -28,7 +28,8 @@ impl<'a> Following<'a> {
             && let [ended, rest @ ..] = self.steps
             && let Some(next) = rest.first()
         {
-            // As the device does: from where the reference is, or from where the motor is if no servo held it there.
+            // As the device does: from where the reference is, or from where the motor is if no
+            // servo held it there.
             self.begin =
                 if ended.excitation.servo.stiffness.0 == 0 { f64::from(count) } else { self.place() };
             self.steps = rest;

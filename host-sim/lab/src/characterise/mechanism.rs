@@ -1,5 +1,6 @@
-//! The virtual device with no hand on it: the control core on the plant of a rig file, whatever effects that file has.
-//! The plant's laws are the ones that the diagnosis names, so a patched rig runs here as it stands.
+//! The virtual device with no hand on it: the control core on the plant of a rig file, whatever
+//! effects that file has. The plant's laws are the ones that the diagnosis names, so a patched rig
+//! runs here unchanged.
 
 use control_core::units::{Counts, Milliradians};
 use control_core::{Controller, Device, Patient, Plan, TICK_HZ, TickInput};
@@ -69,7 +70,8 @@ pub struct BareDevice {
 }
 
 impl BareDevice {
-    /// At rest, powered down. The rig's command is in DAC steps away from mid-scale, and its coordinate an angle.
+    /// At rest, powered down. The rig's command is in DAC steps away from mid-scale, and its
+    /// coordinate an angle.
     pub fn new(rig: &Rig, file: &str) -> Result<Self, Error> {
         if rig.kind != Kind::Rotary || rig.actuator.command_unit != "dac" {
             return Err(Error::input(format_args!(

@@ -1,5 +1,6 @@
-//! `characterise`: makes a device run excitations that separate one physical effect from another, with no hand on the
-//! needle, and writes down what `diagnose` reads. The same commands and bytes serve a real device and the virtual one.
+//! `characterise`: makes a device run excitations that separate one physical effect from another,
+//! with no hand on the needle, and writes down what `diagnose` reads. The same commands and bytes
+//! serve a real device and the virtual one.
 
 mod following;
 pub mod mechanism;
@@ -23,7 +24,8 @@ use written::Track;
 /// The longest single wait for a real device.
 const PATIENCE: Duration = Duration::from_millis(2);
 
-/// The control configuration for characterising: no tissue matters, encoder and torque limits as they are.
+/// The control configuration for characterising: no tissue matters, encoder and torque limits as
+/// they are.
 pub fn configuration() -> Config {
     Config::commissioned_virtual()
 }
@@ -46,7 +48,8 @@ pub enum News<'a> {
     Played(f64),
 }
 
-/// Records every programme on the virtual device. The clock is the device's: it takes as long as the computing does.
+/// Records every programme on the virtual device. The clock is the device's: it takes as long as
+/// the computing does.
 pub fn on_virtual(
     device: &mut BareDevice,
     programmes: &[Programme],
@@ -80,7 +83,8 @@ fn device_tilt(step: &Step, news: &mut impl FnMut(News)) {
     }
 }
 
-/// Records every programme on the device behind `port`, in real time. A cable that is pulled ends it.
+/// Records every programme on the device behind `port`, in real time. A cable that is pulled ends
+/// it.
 pub fn on_port(
     port: &mut dyn Port,
     programmes: &[Programme],
@@ -118,7 +122,8 @@ pub fn on_port(
     Ok(tracks)
 }
 
-/// Checks that every step may be played under `config`; the device checks it again, and the sequences too.
+/// Checks that every step may be played under `config`; the device checks it again, and the
+/// sequences too.
 pub fn check(config: &Config, programmes: &[Programme]) -> Result<(), Error> {
     let refuse = |why: control_core::Refusal| Error::input(format_args!("this excitation is refused: {why}"));
     let plan = config.plan().map_err(refuse)?;

@@ -1,6 +1,6 @@
-//! The excitations of each recording. Amplitudes follow from the nominal mechanism: dry friction sets the torques, inertia
-//! the servo's gains. The held-out recording mixes the same signals with other numbers, so that a model fitted to the others
-//! must predict instead of repeating.
+//! The excitations of each recording. Amplitudes follow from the nominal mechanism: dry friction
+//! sets the torques, inertia the servo's gains. The held-out recording mixes the same signals with
+//! other numbers, so that a model fitted to the others must predict instead of repeating.
 
 use control_core::Plan;
 use control_core::excitation::{Excitation, Sequence, Servo, Signal};
@@ -34,7 +34,8 @@ pub struct Step {
 }
 
 impl Step {
-    /// Returns the tilt by a person who follows the prompt, `into` the step, in rad; the virtual device tilts this way.
+    /// Returns the tilt by a person who follows the prompt, `into` the step, in rad; the virtual
+    /// device tilts this way.
     pub fn tilt_at(&self, into: Duration) -> f64 {
         let whole = f64::from(self.excitation.duration_ms) * 1e-3;
         match self.prompt {
@@ -45,8 +46,9 @@ impl Step {
 }
 
 impl Programme {
-    /// Returns the number of steps of each part in order. A part plays without a rest between its steps: as many as the device takes as one
-    /// sequence under `plan`, and alone a step with a prompt, which takes a person's time.
+    /// Returns the number of steps of each part in order. A part plays without a rest between its
+    /// steps: as many as the device takes as one sequence under `plan`, and alone a step with a
+    /// prompt, which takes a person's time.
     pub fn parts(&self, plan: &Plan) -> Vec<usize> {
         let mut parts: Vec<usize> = Vec::new();
         let mut sequence = Sequence::new();
@@ -76,7 +78,8 @@ impl Programme {
     }
 }
 
-/// The three recordings for a mechanism whose nominal simulation is `rig`, with a roller of `radius_mm`.
+/// The three recordings for a mechanism whose nominal simulation is `rig`, with a roller of
+/// `radius_mm`.
 pub fn programmes(rig: &Rig, radius_mm: f64) -> Vec<Programme> {
     let kit = Kit::new(rig, radius_mm);
     vec![
@@ -163,7 +166,8 @@ impl Kit {
         self.step(signal, duration_ms)
     }
 
-    /// Twelve sines, each of `share` of the dry friction, from below the servo to where a delay and a lag part.
+    /// Twelve sines, each of `share` of the dry friction, from below the servo to where a delay and
+    /// a lag part.
     fn multisine(&self, share: f64, duration_ms: u32) -> Step {
         let frequencies = [5, 9, 14, 21, 32, 47, 68, 97, 139, 197, 281, 397].into_iter().collect();
         let torque = MillinewtonMetres(I16F16::from_num(share * self.dry_mnm));
@@ -176,7 +180,8 @@ impl Kit {
         self.step(Signal::BreakawayRamps { torque, ramp_ms }, duration_ms)
     }
 
-    /// A slow triangle while a person tilts the device: a motor that moves shows the weight, one that sticks hides it.
+    /// A slow triangle while a person tilts the device: a motor that moves shows the weight, one
+    /// that sticks hides it.
     fn tilt(&self, duration_ms: u32) -> Step {
         Step { prompt: Some(TILT_PROMPT), ..self.triangle(30.0, 30.0, duration_ms) }
     }

@@ -1,6 +1,7 @@
-//! Plays one programme on whatever device answers: asks for a part of it, waits until it has been played, asks for the next, and
-//! keeps every sample. The steps of a part play without a rest, as one sequence that the device has taken before it begins.
-//! A fault, a refusal or a lost sample ends it: a recording with a hole is no recording.
+//! Plays one programme on whatever device answers: asks for a part of it, waits until it has been
+//! played, asks for the next, and keeps every sample. The steps of a part play without a rest, as
+//! one sequence that the device has taken before it begins. A fault, a refusal or a lost sample
+//! ends it: a recording with a hole is no recording.
 
 use super::following::Following;
 use super::programme::{Programme, Step};

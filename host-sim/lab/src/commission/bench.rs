@@ -1,4 +1,5 @@
-//! Ways to a device for commissioning and compensation: a serial port, with or without a guide that shows what comes in.
+//! Ways to a device for commissioning and compensation: a serial port, with or without a guide that
+//! shows what comes in.
 
 pub use device_setup::bench::{Act, Line};
 

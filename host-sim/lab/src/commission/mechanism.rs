@@ -1,5 +1,5 @@
-//! A virtual device to be commissioned: the bare device of `characterise` with wires that may be wrong, and a hand that does
-//! what it is asked.
+//! A virtual device to be commissioned: the bare device of `characterise` with wires that may be
+//! wrong, and a hand that does what it is asked.
 
 use super::bench::{Act, Line};
 use crate::characterise::mechanism::{BareDevice, Wiring};
@@ -10,7 +10,8 @@ use diagnosis::rig::Rig;
 use std::f64::consts::TAU;
 use std::time::Duration;
 
-/// The speed at which the hand turns the roller, rad/s, and the stiffness and damping of its grip, N·m/rad and N·m·s/rad.
+/// The speed at which the hand turns the roller, rad/s, and the stiffness and damping of its grip,
+/// N·m/rad and N·m·s/rad.
 const HAND_SPEED: f64 = 6.0;
 const GRIP: (f64, f64) = (0.2, 1.0e-3);
 /// A hand tilts slowly: rad/s.

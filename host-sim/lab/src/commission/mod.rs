@@ -1,5 +1,5 @@
-//! `commission`: finds out how a device is wired and built before anybody holds its needle, and gives it its part of the
-//! configuration (`device-setup`), on a serial port or a virtual device.
+//! `commission`: finds out how a device is wired and built before anybody holds its needle, and
+//! gives it its part of the configuration (`device-setup`), on a serial port or a virtual device.
 
 pub mod bench;
 pub mod mechanism;

@@ -5,7 +5,8 @@ use device_sim::device::device_config;
 use device_sim::error::Error;
 use std::path::{Path, PathBuf};
 
-/// Writes `compensation.html` and `device.toml` of the device called `device` to a folder, which is made; returns their paths.
+/// Writes `compensation.html` and `device.toml` of the device called `device` to a folder, which is
+/// made; returns their paths.
 ///
 /// # Errors
 /// A sentence if they cannot be written.

@@ -1,5 +1,5 @@
-//! `compensate`: turns what a diagnosis found of a device's own forces into what the device feeds forward (`device-setup`), on a serial
-//! port or a virtual device.
+//! `compensate`: turns what a diagnosis found of a device's own forces into what the device feeds
+//! forward (`device-setup`), on a serial port or a virtual device.
 
 pub mod files;
 pub mod page;
@@ -24,8 +24,8 @@ pub fn read_report(dir: &Path) -> Result<Rig, Error> {
     Rig::read(&path).map_err(Error::input)
 }
 
-/// Compensates the device behind `line` for what `rig` found, with gains at `share` of the most that is usual; `ask` is told each
-/// step before it is done, and may end it.
+/// Compensates the device behind `line` for what `rig` found, with gains at `share` of the most
+/// that is usual; `ask` is told each step before it is done, and may end it.
 pub fn compensate(
     line: &mut dyn Line,
     rig: &Rig,

@@ -1,7 +1,9 @@
-//! A curve of straight pieces between landmarks, fitted to many noisy points. Depth in mm, force in N.
+//! A curve of straight pieces between landmarks, fitted to many noisy points. Depth in mm, force in
+//! N.
 //!
-//! Landmarks cut an insertion into pieces: a rise, a fall, a rise … A depth is told by its piece and how far it is along it, so that
-//! insertions whose layers give way at different depths are laid over one another. Only rises are fitted; a fall joins the two.
+//! Landmarks cut an insertion into pieces: a rise, a fall, a rise … A depth is given by its piece
+//! and how far it is along it, so that insertions whose layers give way at different depths are
+//! laid over one another. Only rises are fitted; a fall joins the two.
 
 /// A line of straight pieces.
 #[derive(Clone, Debug, PartialEq)]
@@ -24,7 +26,8 @@ impl Curve {
     }
 }
 
-/// The depths that cut an insertion into pieces: the skin, the beginning and the end of each fall, the deepest place.
+/// The depths that cut an insertion into pieces: the skin, the beginning and the end of each fall,
+/// the deepest place.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Landmarks(pub Vec<f64>);
 
@@ -56,7 +59,8 @@ pub(crate) fn is_rise(piece: usize) -> bool {
 /// Parts of a piece in which its points are taken together.
 const PARTS: usize = 64;
 
-/// The points of the last part of a piece count this often: the force at which a layer gives way is felt more than the way to it.
+/// The points of the last part of a piece count this often: the force at which a layer gives way is
+/// felt more than the way to it.
 const PEAK_WEIGHT: f64 = 8.0;
 
 /// The points of one cell, laid over one another.
@@ -100,7 +104,8 @@ impl Overlaid {
         self.pieces[piece].iter().any(|part| part.count > 0.0)
     }
 
-    /// The forces at the knots of a piece that fit its points best, by least squares over all knots at once; none without points.
+    /// The forces at the knots of a piece that fit its points best, by least squares over all knots
+    /// at once; none without points.
     pub fn fit(&self, piece: usize, knots: &[f64]) -> Option<Vec<f64>> {
         if !self.has(piece) {
             return None;
@@ -128,7 +133,8 @@ impl Overlaid {
         Some(tridiagonal(diagonal, &upper, right))
     }
 
-    /// Squares of what the best forces at these knots leave of the means of the parts, each part counting by its points.
+    /// Squares of what the best forces at these knots leave of the means of the parts, each part
+    /// counting by its points.
     pub fn left(&self, piece: usize, knots: &[f64]) -> f64 {
         let Some(forces) = self.fit(piece, knots) else { return 0.0 };
         let parts = self.pieces[piece].iter().filter(|part| part.count > 0.0);
@@ -197,7 +203,7 @@ mod tests {
 
     #[test]
     fn knots_gather_where_a_curve_bends() {
-        // Level, then a rise like the sixth power: most of its bend lies in the last third.
+        // Level, then a rise like the sixth power: most of its bend is in the last third.
         let truth = |x: f64| (x / 10.0).powi(6);
         let points: Vec<_> =
             (0..4_000).map(|n| (f64::from(n) * 0.0025, truth(f64::from(n) * 0.0025))).collect();

@@ -1,9 +1,10 @@
-//! The places where the force of an insertion falls because a layer gives way: the landmarks that insertions have in common. Numbers only: depth in
-//! mm, force in N.
+//! The places where the force of an insertion falls because a layer gives way: the landmarks that
+//! insertions have in common. Numbers only: depth in mm, force in N.
 
 /// Points are taken together over this depth to look for falls.
 const BIN_MM: f64 = 0.05;
-/// A fall is one by this share of its peak, or of the largest force by [`LEAST_OF_LARGEST`], or by [`LEAST_SIGMAS`] of the noise of a bin.
+/// A fall is one by this share of its peak, or of the largest force by [`LEAST_OF_LARGEST`], or by
+/// [`LEAST_SIGMAS`] of the noise of a bin.
 const LEAST_OF_PEAK: f64 = 0.15;
 const LEAST_OF_LARGEST: f64 = 0.04;
 const LEAST_SIGMAS: f64 = 6.0;
@@ -59,11 +60,13 @@ fn bins(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     bins
 }
 
-/// Standard deviation of the noise of a bin: second differences of a smooth curve have nothing else in them.
+/// Standard deviation of the noise of a bin: second differences of a smooth curve have nothing else
+/// in them.
 fn noise(bins: &[(f64, f64)]) -> f64 {
     let mut bends: Vec<f64> = bins.windows(3).map(|w| (w[0].1 - 2.0 * w[1].1 + w[2].1).abs()).collect();
     bends.sort_by(f64::total_cmp);
-    // Of a normal distribution the median of the magnitude is 0.6745 of sigma; a second difference has six times the variance.
+    // Of a normal distribution the median of the magnitude is 0.6745 of sigma; a second difference
+    // has six times the variance.
     bends.get(bends.len() / 2).map_or(0.0, |median| median / 0.6745 / 6.0_f64.sqrt())
 }
 

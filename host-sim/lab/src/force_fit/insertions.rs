@@ -1,5 +1,6 @@
-//! Insertions to fit a force to: from the device's own recordings (MCAP) or from anybody's measurements (CSV). Each is cut down to its way
-//! in at an even speed, and becomes (perpendicular depth, force) at one speed and one angle.
+//! Insertions to fit a force to: from the device's own recordings (MCAP) or from anybody's
+//! measurements (CSV). Each is cut down to its way in at an even speed, and becomes (perpendicular
+//! depth, force) at one speed and one angle.
 
 use control_core::TICK_HZ;
 use device_sim::error::Error;
@@ -13,7 +14,8 @@ const SHORTEST_MM: f64 = 1.0;
 const DRAWN_BACK_MM: f64 = 1.0;
 /// Speed is told over this time, s: long against an encoder's step, short against a way in.
 const SPEED_S: f64 = 0.1;
-/// The largest share by which the needle may be slower or faster than the way's median; beyond it is a beginning, an end, or a jump at a puncture.
+/// The largest share by which the needle may be slower or faster than the way's median; beyond it
+/// is a beginning, an end, or a jump at a puncture.
 const EVEN: f64 = 0.5;
 /// As many a second are enough for a curve with knots of a quarter of a mm.
 const MOST_HZ: f64 = 1_000.0;
@@ -92,7 +94,8 @@ fn from_recording(recording: &Recording) -> Vec<Vec<Moment>> {
     moments.collect()
 }
 
-/// `time_s,depth_mm,force_n` and `angle_deg` or `tilt_rad`, in any order; other columns are ignored.
+/// `time_s,depth_mm,force_n` and `angle_deg` or `tilt_rad`, in any order; other columns are
+/// ignored.
 fn parse_csv(file: &str, text: &str) -> Result<Vec<Moment>, Error> {
     let mut lines = text.lines().enumerate();
     let header = lines.next().map_or("", |(_, line)| line).trim_start_matches('\u{feff}');

@@ -1,7 +1,9 @@
-//! From insertions at several speeds and angles to the force table of Paper 000, and how good it is on insertions that it has not seen.
+//! From insertions at several speeds and angles to the force table of Paper 000, and how good it is
+//! on insertions that it has not seen.
 //!
-//! [`insertions`] reads recordings, [`mod@falls`], [`curve`] and [`table`] are the numerics, [`page`] shows measured against fitted. It may
-//! not run a device, and it takes a force as it was measured, whoever measured it. What is judged is the table that is written.
+//! [`insertions`] reads recordings, [`mod@falls`], [`curve`] and [`table`] are the numerics,
+//! [`page`] shows measured against fitted. It may not run a device, and it takes a force as it was
+//! measured, whoever measured it. What is judged is the table that is written.
 
 pub mod curve;
 pub mod falls;
@@ -61,12 +63,13 @@ pub struct Fit {
     pub table: Table,
     /// The insertions that it was fitted to.
     pub insertions: Vec<Insertion>,
-    /// The insertions that it was judged by: those given for it, or each of the others in its turn, left out.
+    /// The insertions that it was judged by: those given for it, or each of the others in its turn,
+    /// left out.
     pub judged: Vec<Judgement>,
 }
 
-/// Fits the table to `insertions`. It is judged by `unseen`; where there is none, by each insertion in its turn, left out. None where
-/// there is nothing to fit.
+/// Fits the table to `insertions`. It is judged by `unseen`; where there is none, by each insertion
+/// in its turn, left out. None where there is nothing to fit.
 pub fn fit(insertions: Vec<Insertion>, unseen: &[Insertion]) -> Option<Fit> {
     let table = fit_table(&insertions)?;
     let judged = if unseen.is_empty() {
@@ -92,7 +95,8 @@ fn judge(table: &Table, seen: &[Insertion], one: &Insertion, seen_n: Option<f64>
             && (other.angle_deg - one.angle_deg).abs() < SAME_ANGLE_DEG
     };
     let found = falls(&one.points);
-    // Where a layer was seen that the table does not have, or the other way, peaks cannot be told apart.
+    // Where a layer was seen that the table does not have, or the other way, peaks cannot be
+    // distinguished.
     let curve = table.curve(one.speed_mm_s, one.angle_deg);
     let is_same = found.len() == table.gives_way.len();
     let peaks = table.gives_way.iter().map(|knot| curve.forces_n[*knot]);
@@ -130,7 +134,8 @@ fn fit_table(insertions: &[Insertion]) -> Option<Table> {
         let there: Vec<usize> =
             (0..insertions.len()).filter(|index| cell_of(&insertions[*index]) == (s, a)).collect();
         let marks = |falls: &[Fall]| landmarks(falls, deepest);
-        // An insertion in which a layer was not seen to give way is laid over the others as they do.
+        // An insertion in which a layer was not seen to give way is laid over the others as they
+        // do.
         let usual = mean_falls(there.iter().filter_map(|index| found[*index].as_deref()))
             .or_else(|| mean_falls(found.iter().flatten().map(Vec::as_slice)))?;
         let mut points = Overlaid::new(marks(&usual).pieces());
@@ -144,7 +149,8 @@ fn fit_table(insertions: &[Insertion]) -> Option<Table> {
     Table::fit(speeds, angles, &cells)
 }
 
-/// As many falls for each insertion as most of them have, the largest ones; none for one that has fewer.
+/// As many falls for each insertion as most of them have, the largest ones; none for one that has
+/// fewer.
 fn same_falls(insertions: &[Insertion]) -> Vec<Option<Vec<Fall>>> {
     let all: Vec<Vec<Fall>> = insertions.iter().map(|one| falls(&one.points)).collect();
     let mut counts: Vec<usize> = all.iter().map(Vec::len).collect();
@@ -217,7 +223,8 @@ mod tests {
         base * (1.0 + 0.1 * speed) * (0.6 + angle / 120.0)
     }
 
-    /// Measured with noise of 10 mN rms, at a speed and an angle that are a little off; the same every time.
+    /// Measured with noise of 10 mN rms, at a speed and an angle that are a little off; the same
+    /// every time.
     fn insertion(speed: f64, angle: f64, take: u32) -> Insertion {
         let points = (0..1_600_u32).map(|n| {
             let depth = f64::from(n) * 0.005;

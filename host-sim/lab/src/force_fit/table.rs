@@ -1,13 +1,17 @@
-//! The force of paper 000 as a table over depth, speed and angle, and what to do with the cells that nobody measured.
+//! The force of paper 000 as a table over depth, speed and angle, and what to do with the cells
+//! that nobody measured.
 //!
-//! Depth is perpendicular to the skin, so that a layer is met at the same place whatever the angle. Knots of the same number belong
-//! together in all cells: the beginning of a fall, its end, and what lies between in the same proportion. Between the cells depth and force
-//! of a knot are interpolated, as the device does it.
+//! Depth is perpendicular to the skin, so that a layer is met at the same place whatever the angle.
+//! Knots of the same number belong together in all cells: the beginning of a fall, its end, and
+//! what is between in the same proportion. Between the cells depth and force of a knot are
+//! interpolated, as the device does it.
 //!
-//! Cells that were not measured are filled as if speed scaled the force by a factor of its own: the nearest measured curve of that angle
-//! times what this speed is to its speed where both were measured (`F(d, v, a) = f_a(d)·g(v)`), or, at an angle without any,
-//! `base(d)·g(v)·h(a)`; its knots lie as much deeper than that curve's as they do at another angle where both speeds were measured. With
-//! the paper's five cells of nine that is as much as can be known, and it is marked as what it is.
+//! Cells that were not measured are filled as if speed scaled the force by a factor of its own: the
+//! nearest measured curve of that angle times what this speed is to its speed where both were
+//! measured (`F(d, v, a) = f_a(d)·g(v)`), or, at an angle without any, `base(d)·g(v)·h(a)`; its
+//! knots lie as much deeper than that curve's as they do at another angle where both speeds were
+//! measured. With the paper's five cells of nine that is as much as can be known, and it is marked
+//! as what it is.
 
 use super::curve::{Curve, Knots, Landmarks, Overlaid, is_rise, place_knots};
 use control_core::config::MAX_DEPTHS;
@@ -60,7 +64,8 @@ const ROUNDS: usize = 12;
 const LEAST_GAP_MM: f64 = 0.05;
 
 impl Table {
-    /// Fits the cells that were measured, `measured[speed][angle]`, which have as many landmarks each, and fills the others. None where no cell was.
+    /// Fits the cells that were measured, `measured[speed][angle]`, which have as many landmarks
+    /// each, and fills the others. None where no cell was.
     pub fn fit(
         speeds_mm_s: Vec<f64>,
         angles_deg: Vec<f64>,
@@ -81,7 +86,8 @@ impl Table {
         Some(Self { speeds_mm_s, angles_deg, cells, gives_way: gives_way(&knots) })
     }
 
-    /// The force over depth at a speed and an angle; between the cells in proportion, beyond them as at the nearest.
+    /// The force over depth at a speed and an angle; between the cells in proportion, beyond them
+    /// as at the nearest.
     pub fn curve(&self, speed_mm_s: f64, angle_deg: f64) -> Curve {
         let (s, t) = between(&self.speeds_mm_s, speed_mm_s);
         let (a, u) = between(&self.angles_deg, angle_deg);
@@ -141,7 +147,8 @@ fn fitted(cell: &Measured, knots: &Knots) -> Curve {
     curve
 }
 
-/// As the file and the device hold it: hundredths of a mm and mN, rising in depth, and no pull for a push.
+/// As the file and the device hold it: hundredths of a mm and mN, rising in depth, and no pull for
+/// a push.
 fn rounded(cell: Cell) -> Cell {
     let mut depths_mm: Vec<f64> =
         cell.force.depths_mm.iter().map(|mm| (mm * 100.0).round() / 100.0).collect();
@@ -155,7 +162,8 @@ fn rounded(cell: Cell) -> Cell {
 /// `base(d)·g(v)·h(a)` from the cells that are there.
 struct Separable {
     base: Vec<f64>,
-    /// Logarithms of g and h; none for a speed or an angle that no measured cell ties to the others.
+    /// Logarithms of g and h; none for a speed or an angle that no measured cell ties to the
+    /// others.
     speeds: Vec<Option<f64>>,
     angles: Vec<Option<f64>>,
 }
@@ -201,14 +209,16 @@ impl Separable {
         let (Some(g), Some(h)) = (self.speeds[s], self.angles[a]) else {
             return Some(Cell { force: nearest.clone(), origin: Origin::Nearest });
         };
-        // A measured curve of the same angle keeps what that angle does to the shape, which no factor can tell.
+        // A measured curve of the same angle keeps what that angle does to the shape, which no
+        // factor can tell.
         let beside = there().filter(|(s2, a2, _)| *a2 == a && self.speeds[*s2].is_some());
         let Some((s2, _, shape)) = beside.min_by_key(|(s2, ..)| s.abs_diff(*s2)) else {
             let forces_n = self.base.iter().map(|n| n * (g + h).exp()).collect();
             return Some(Cell { force: Curve { forces_n, ..nearest.clone() }, origin: Origin::Separable });
         };
         let factor = (g - self.speeds[s2].unwrap_or(g)).exp();
-        // How much deeper a knot lies at this speed than at that one, at an angle where both were measured.
+        // How much deeper a knot lies at this speed than at that one, at an angle where both were
+        // measured.
         let both =
             (0..fitted[s].len()).find_map(|a2| Some((fitted[s][a2].as_ref()?, fitted[s2][a2].as_ref()?)));
         let deeper =
@@ -226,7 +236,8 @@ fn scale(forces: &[f64], base: &[f64]) -> f64 {
     if below > 0.0 { above / below } else { 1.0 }
 }
 
-/// `log size = g + h` by least squares on the cells that are there; none for what no chain of cells ties to the first.
+/// `log size = g + h` by least squares on the cells that are there; none for what no chain of cells
+/// ties to the first.
 fn factors(
     logs: &[(usize, usize, f64)],
     speeds: usize,

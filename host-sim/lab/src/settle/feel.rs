@@ -1,5 +1,5 @@
-//! The use of what was settled: the device feeds it forward, a hand's force is measured before and after, and what is not better is taken
-//! back.
+//! The use of what was settled: the device feeds it forward, a hand's force is measured before and
+//! after, and what is not better is taken back.
 
 use super::subject::Subject;
 use super::{Progress, Settings};
@@ -19,8 +19,8 @@ pub struct Feel {
     pub notes: Vec<String>,
 }
 
-/// Feeds forward what `rig` has beyond its plain values, and writes the page and the device's part beside `settle.html`. The sentence where
-/// nothing is fed forward.
+/// Feeds forward what `rig` has beyond its plain values, and writes the page and the device's part
+/// beside `settle.html`. The sentence where nothing is fed forward.
 ///
 /// # Errors
 /// A sentence if a person ends it or a file cannot be written.

@@ -7,7 +7,8 @@ use diagnosis::report::{Report, Verdict};
 use experiment::{Case, design};
 use std::path::Path;
 
-/// The longest input of a round, s: it is played twice, once to fit and once, with other numbers, to judge.
+/// The longest input of a round, s: it is played twice, once to fit and once, with other numbers,
+/// to judge.
 const INPUT_S: f64 = 16.0;
 /// Rounds before a diagnosis counts: a second input shows an effect that hides in the first.
 const LEAST_ROUNDS: usize = 2;
@@ -48,7 +49,8 @@ pub(super) fn following(
 /// Rounds that are designed against a class before it stays as it is.
 const DESIGNED_AGAINST: usize = 2;
 
-/// The conclusion if inputs that were designed to tell the members of a class apart left all of them.
+/// The conclusion if inputs that were designed to tell the members of a class apart left all of
+/// them.
 fn not_told_apart(settled: &Settled) -> Option<String> {
     let since = settled.rounds.len().checked_sub(DESIGNED_AGAINST + 1)?;
     let [first, later @ ..] = &settled.rounds[since..] else { return None };
@@ -63,7 +65,8 @@ fn has_members(a: &[String], b: &[String]) -> bool {
     a.len() == b.len() && a.iter().all(|one| b.contains(one))
 }
 
-/// The conclusion if each name is single, or nothing is there to be named, after `least_rounds` or more.
+/// The conclusion if each name is single, or nothing is there to be named, after `least_rounds` or
+/// more.
 fn is_settled(report: &Report, settled: &Settled, least_rounds: usize) -> Option<String> {
     let explained = matches!(report.verdict, Verdict::NoMismatch | Verdict::ParametersOnly);
     let has_names = settled.rounds.last().is_some_and(|round| !round.names.is_empty());

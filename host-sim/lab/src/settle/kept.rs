@@ -1,12 +1,14 @@
 //! Names that a round keeps of the round before.
 //!
-//! A diagnosis names an effect only if it is a material part of the force in all recordings together. An input that was designed to tell
-//! rivals apart need not show the effect large: with it the effect becomes a smaller part, while there is more evidence for it.
-//! So a small part takes no name back, and rivals and the model without the effect do.
+//! A diagnosis names an effect only if it is a material part of the force in all recordings
+//! together. An input that was designed to tell rivals apart need not show the effect large: with
+//! it the effect becomes a smaller part, while there is more evidence for it. So a small part takes
+//! no name back, and rivals and the model without the effect do.
 
 use super::Name;
 
-/// The names of a diagnosis, or, if it gives none, those of the round before that still lead the contenders.
+/// The names of a diagnosis, or, if it gives none, those of the round before that still lead the
+/// contenders.
 pub(super) fn kept(before: &[Name], names: Vec<Name>, contenders: &[(String, f64)]) -> Vec<Name> {
     let most = contenders.iter().max_by(|a, b| a.1.total_cmp(&b.1));
     let Some((leader, _)) = most.filter(|_| names.is_empty()) else { return names };
@@ -17,7 +19,7 @@ pub(super) fn kept(before: &[Name], names: Vec<Name>, contenders: &[(String, f64
         .collect()
 }
 
-/// `name` with what is left of its class, as probable as the contenders of that class together.
+/// `name` with the rest of its class, as probable as the contenders of that class together.
 fn of(name: &Name, leader: &str, contenders: &[(String, f64)]) -> Name {
     let left = || contenders.iter().filter(|(contender, _)| name.class.contains(contender));
     Name {

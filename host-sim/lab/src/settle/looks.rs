@@ -1,19 +1,22 @@
-//! The confidence of a name that a run has looked for in every round: a name that chance makes in one diagnosis of twenty comes up in
-//! one run of four, if the run may stop at the first of five diagnoses that gives it.
+//! The confidence of a name that a run has looked for in every round: a name that chance makes in
+//! one diagnosis of twenty comes up in one run of four, if the run may stop at the first of five
+//! diagnoses that gives it.
 
 use super::Name;
 
 /// Confidence below which a diagnosis names nothing.
 const LEAST: f64 = 2.0 / 3.0;
 
-/// The part of the error that a run may still make that each of its diagnoses takes: the first half of all, the last what is left.
+/// The part of the error that a run may still make that each of its diagnoses takes: the first half
+/// of all, the last the rest.
 const SPENT: f64 = 0.5;
 
-/// Names of the last round with a confidence that counts the looks of a run of at most `most` rounds, and those that are then too unsure
-/// to be names.
+/// Names of the last round with a confidence that counts the looks of a run of at most `most`
+/// rounds, and those that are then too unsure to be names.
 ///
-/// A run could have stopped for a name in the round since which the name stands. An error is spent on each round in turn (a union bound):
-/// if each name's error is no more than its share, the run's errors together are no more than that.
+/// A run could have stopped for a name in the round since which the name stands. An error is spent
+/// on each round in turn (a union bound): if each name's error is no more than its share, the run's
+/// errors together are no more than that.
 pub(super) fn corrected(rounds: &[Vec<Name>], most: usize) -> (Vec<Name>, Vec<Name>) {
     let Some(last) = rounds.last() else { return (Vec::new(), Vec::new()) };
     let counted = |name: &Name| {
@@ -76,8 +79,9 @@ mod tests {
         }
     }
 
-    /// A run stops at the first of five looks that gives a name; where nothing is there, each look gives one with the probability that
-    /// its confidence admits. However sure a name is said to be, at most that part of the runs gives it.
+    /// A run stops at the first of five looks that gives a name; where nothing is there, each look
+    /// gives one with the probability that its confidence admits. However sure a name is said to
+    /// be, at most that part of the runs gives it.
     #[test]
     fn a_run_without_anything_to_find_names_as_rarely_as_it_says() {
         let runs = 20_000;

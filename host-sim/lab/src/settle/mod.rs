@@ -1,5 +1,6 @@
-//! `settle`: a device records, diagnoses, designs the experiment that tells the remaining rivals apart, and records again, until one
-//! name is left or nothing tells the rest apart. What was settled is fed forward by the device, as far as it can be.
+//! `settle`: a device records, diagnoses, designs the experiment that tells the remaining rivals
+//! apart, and records again, until one name is left or nothing tells the rest apart. What was
+//! settled is fed forward by the device, as far as it can be.
 
 mod feel;
 mod following;
@@ -39,9 +40,11 @@ pub enum Inputs {
     Designed,
     /// Random multisines, for comparison.
     Multisines,
-    /// The excitations of `characterise`, shortened to the motion that is allowed, in one round, for comparison.
+    /// The excitations of `characterise`, shortened to the motion that is allowed, in one round,
+    /// for comparison.
     Characterise,
-    /// The needle pushed in and drawn out as in practice, in one round, for comparison: nothing is asked.
+    /// The needle pushed in and drawn out as in practice, in one round, for comparison: nothing is
+    /// asked.
     Passive,
 }
 
@@ -93,7 +96,8 @@ pub struct Round {
     pub sentence: String,
     /// Names that contend afterwards, with their probabilities; `none` for none of them.
     pub contenders: Vec<(String, f64)>,
-    /// Names after the diagnosis of all recordings so far, with the confidence of that diagnosis alone.
+    /// Names after the diagnosis of all recordings so far, with the confidence of that diagnosis
+    /// alone.
     pub names: Vec<Name>,
 }
 
@@ -104,7 +108,8 @@ pub struct Name {
     pub name: String,
     /// Names that the recordings cannot tell from it, itself included.
     pub class: Vec<String>,
-    /// Probability that the class holds the truth; in the outcome of a run, with all its looks counted.
+    /// Probability that the class holds the truth; in the outcome of a run, with all its looks
+    /// counted.
     pub confidence: f64,
 }
 
@@ -119,7 +124,8 @@ pub struct Settled {
     pub unsure: Vec<Name>,
     /// Why no further round follows, a sentence without its full stop.
     pub conclusion: String,
-    /// The force on a hand before and after, or why nothing is fed forward; none where nothing is named or it was not asked for.
+    /// The force on a hand before and after, or why nothing is fed forward; none where nothing is
+    /// named or it was not asked for.
     pub feel: Option<Result<Feel, String>>,
 }
 
@@ -180,11 +186,12 @@ struct Asked {
     design: Option<Box<Design>>,
 }
 
-/// Settles the diagnosis of a device whose simulation is `rig`. `progress` is told each round and each step of the compensation before the
-/// motor moves, and may end the run there.
+/// Settles the diagnosis of a device whose simulation is `rig`. `progress` is told each round and
+/// each step of the compensation before the motor moves, and may end the run there.
 ///
 /// # Errors
-/// A sentence if an input is refused before it starts, a fault or a person ends a recording, or files cannot be read or written.
+/// A sentence if an input is refused before it starts, a fault or a person ends a recording, or
+/// files cannot be read or written.
 pub fn settle(
     subject: &mut Subject,
     rig: &Rig,
@@ -262,7 +269,8 @@ impl Run<'_> {
         }
     }
 
-    /// Plays programmes and writes the recordings, which the next diagnosis reads together with those before.
+    /// Plays programmes and writes the recordings, which the next diagnosis reads together with
+    /// those before.
     fn record(
         &mut self,
         subject: &mut Subject,

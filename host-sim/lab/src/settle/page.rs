@@ -139,7 +139,8 @@ fn rounds(count: usize) -> String {
     if count == 1 { "1 round".to_owned() } else { format!("{count} rounds") }
 }
 
-/// Writes the probability of each contender after each round, in %; a dash where it does not contend.
+/// Writes the probability of each contender after each round, in %; a dash where it does not
+/// contend.
 fn contenders(sheet: &mut Sheet, settled: &Settled) {
     let mut names: Vec<&str> = Vec::new();
     for (name, _) in settled.rounds.iter().flat_map(|round| &round.contenders) {

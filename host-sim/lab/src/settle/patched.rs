@@ -1,19 +1,20 @@
-//! The simulation with what was settled: what the device feeds forward, and what its author takes over.
+//! The simulation with what was settled: what the device feeds forward, and what its author takes
+//! over.
 
 use super::Name;
 use diagnosis::Outcome;
 use diagnosis::effects::EffectName;
 use diagnosis::rig::Rig;
 
-/// The rig of the last diagnosis with the settled effects and no others. A name that a round kept is not in the patched rig of a
-/// diagnosis that names nothing; it is in the rig of its contender.
+/// The rig of the last diagnosis with the settled effects and no others. A name that a round kept
+/// is not in the patched rig of a diagnosis that names nothing; it is in the rig of its contender.
 pub(super) fn patched(last: &Outcome, names: &[Name]) -> Rig {
     let rigs: Vec<&Rig> = std::iter::once(&last.patched_rig).chain(&last.contending_rigs).collect();
     with_settled(&rigs, &last.nominal_rig, names)
 }
 
-/// The first of `rigs` that has every settled effect, or the first one, without the effects that are neither settled nor in the `nominal`
-/// rig.
+/// The first of `rigs` that has every settled effect, or the first one, without the effects that
+/// are neither settled nor in the `nominal` rig.
 fn with_settled(rigs: &[&Rig], nominal: &Rig, names: &[Name]) -> Rig {
     let has = |rig: &Rig, name: &Name| rig.effects.iter().any(|effect| effect.name.as_str() == name.name);
     let has_all = |rig: &&&Rig| names.iter().all(|name| has(rig, name));

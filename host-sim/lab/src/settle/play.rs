@@ -12,11 +12,12 @@ use diagnosis::rig::Rig;
 use experiment::{Design, Input, Limits, Segment, Signal, random_multisine};
 use fixed::types::I16F16;
 
-/// Largest speed of an input along the roller, mm/s: near the fastest steps of `characterise`, 640 and 680 mm/s.
+/// Largest speed of an input along the roller, mm/s: near the fastest steps of `characterise`, 640
+/// and 680 mm/s.
 const SPEED_MM_PER_S: f64 = 650.0;
 
-/// Strokes of practice: their length in mm, their speed in mm/s, and their part of the time. An epidural is pushed in by 40 to 60 mm in
-/// some seconds.
+/// Strokes of practice: their length in mm, their speed in mm/s, and their part of the time. An
+/// epidural is pushed in by 40 to 60 mm in some seconds.
 const PRACTICE: [(f64, f64, f64); 2] = [(50.0, 50.0, 0.6), (20.0, 20.0, 0.4)];
 
 /// Strokes before random multisines, s.
@@ -65,7 +66,8 @@ impl Limited {
         self.of_input(&together(signals, most_s), why.to_owned(), None)
     }
 
-    /// A later round of some of everything, with other numbers: other speeds, faster reversals, and twice the force.
+    /// A later round of some of everything, with other numbers: other speeds, faster reversals, and
+    /// twice the force.
     pub(super) fn general_again(&self, why: &str, most_s: f64) -> Result<Asked, Error> {
         let rad = |mm: f64| mm / self.radius_mm;
         let frequencies = vec![6, 10, 16, 24, 36, 52, 75, 108, 151, 212, 289, 390];
@@ -210,7 +212,8 @@ mod tests {
         assert!((seconds - 24.0).abs() < 0.01, "{seconds} s");
     }
 
-    /// Whatever the mechanism is, the servo's reference and the torque of the sines stay below four fifths of the device's limits.
+    /// Whatever the mechanism is, the servo's reference and the torque of the sines stay below four
+    /// fifths of the device's limits.
     #[test]
     fn what_is_not_designed_leaves_a_fifth_of_the_limits() {
         let limited = limited();
@@ -225,7 +228,8 @@ mod tests {
         }
     }
 
-    /// The farthest reference in mm, its largest speed in mm/s, and the largest torque in mN·m, if all sines are at their peaks.
+    /// The farthest reference in mm, its largest speed in mm/s, and the largest torque in mN·m, if
+    /// all sines are at their peaks.
     fn most(signal: &excitation::Signal) -> (f64, f64, f64) {
         let largest =
             |first: f64, ratio: I16F16, steps: u8| first * ratio.to_num::<f64>().powi(i32::from(steps) - 1);
@@ -246,7 +250,8 @@ mod tests {
         }
     }
 
-    /// Plays `input` as it is and varied on a machine whose motor gives `gain` N·m for a DAC step, with `effects` concealed in it.
+    /// Plays `input` as it is and varied on a machine whose motor gives `gain` N·m for a DAC step,
+    /// with `effects` concealed in it.
     fn played(input: &Input, gain: f64, effects: &str) -> Result<(), String> {
         let text = format!(
             "format = 1\nname = \"concealed\"\nkind = \"rotary\"\n\
@@ -268,7 +273,8 @@ mod tests {
 
     const GAIN: f64 = 1.4e-5;
 
-    /// The motor stops at a reversal, its load flies on through the gap and knocks the motor on against its torque.
+    /// The motor stops at a reversal, its load flies on through the gap and knocks the motor on
+    /// against its torque.
     #[test]
     fn a_load_that_knocks_in_its_gap_is_no_swapped_lead() {
         for (coast, contact, ratio) in [(237.8, 186.5, 0.87), (150.0, 100.0, 1.0), (240.0, 250.0, 0.4)] {
@@ -286,7 +292,8 @@ mod tests {
         }
     }
 
-    /// A torque that swings faster than its delay drives the motor against what is asked for at that moment.
+    /// A torque that swings faster than its delay drives the motor against what is asked for at
+    /// that moment.
     #[test]
     fn a_motor_that_obeys_late_is_no_swapped_lead() {
         let frequencies = [5, 8, 11, 17, 24, 36, 59, 76, 116, 177, 286, 421];
@@ -296,7 +303,8 @@ mod tests {
         }
     }
 
-    /// An unbalanced roller rests where sines of up to half a kilohertz shake it over one edge of the encoder.
+    /// An unbalanced roller rests where sines of up to half a kilohertz shake it over one edge of
+    /// the encoder.
     #[test]
     fn a_motor_shaken_over_one_count_is_no_dead_channel() {
         let late = "[[effect]]\nname = \"command_delay\"\nshape = { delay = 0.00186 }\n\
@@ -306,7 +314,8 @@ mod tests {
         assert_eq!(played(&multisine(1.31e-3, frequencies), GAIN, late), Ok(()));
     }
 
-    /// Every kind of signal with the servo that follows it: the motor runs away from where it should be.
+    /// Every kind of signal with the servo that follows it: the motor runs away from where it
+    /// should be.
     #[test]
     fn swapped_leads_end_an_input_as_what_they_are() {
         let limited = limited();

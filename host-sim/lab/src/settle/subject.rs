@@ -1,4 +1,5 @@
-//! The device that settles its diagnosis: a virtual one with a concealed mechanism, or a real one behind a port.
+//! The device that settles its diagnosis: a virtual one with a concealed mechanism, or a real one
+//! behind a port.
 
 use super::Plant;
 use crate::characterise::mechanism::BareDevice;

@@ -1,5 +1,6 @@
-//! The instructor's board: the newest state of every device, who is stuck, who is gone. Pure: the caller passes the time and the
-//! messages. Each message is checked for its size and form and passed on to the page unchanged.
+//! The instructor's board: the newest state of every device, who is stuck, who is gone. Pure: the
+//! caller passes the time and the messages. Each message is checked for its size and form and
+//! passed on to the page unchanged.
 
 use super::Name;
 use super::message::{ClassScore, Kind};

@@ -1,4 +1,5 @@
-//! The messages of a device to its class: JSON under the Zenoh key `needle/CLASS/DEVICE/KIND`. Units stand in the names.
+//! The messages of a device to its class: JSON under the Zenoh key `needle/CLASS/DEVICE/KIND`.
+//! Units stand in the names.
 
 use crate::streams::NeedlePose;
 use device_sim::page::messages::Event;
@@ -15,7 +16,8 @@ pub enum Kind {
     Event,
     /// A [`ClassScore`], at the end of each insertion.
     Score,
-    /// An [`About`], once a second and whenever another patient is chosen: whoever comes later learns all from it.
+    /// An [`About`], once a second and whenever another patient is chosen: whoever comes later
+    /// learns all from it.
     About,
 }
 
@@ -23,13 +25,13 @@ impl Kind {
     const ALL: [(Self, &str); 4] =
         [(Self::Pose, "pose"), (Self::Event, "event"), (Self::Score, "score"), (Self::About, "about")];
 
-    /// As it stands in a key.
+    /// As a key holds it.
     pub fn as_str(self) -> &'static str {
         Self::ALL.iter().find(|(kind, _)| *kind == self).map_or("", |(_, name)| name)
     }
 
-    /// Longest message in bytes that the instructor takes, several times what a device sends. Poses that had to wait for a second
-    /// come in one message.
+    /// Longest message in bytes that the instructor takes, several times what a device sends. Poses
+    /// that had to wait for a second come in one message.
     pub(super) const fn longest(self) -> usize {
         match self {
             Self::Pose => 64 * 1024,
@@ -54,7 +56,8 @@ pub struct Poses {
     pub poses: Vec<PoseRow>,
 }
 
-/// A pose in short: time in s, depth in mm, speed in mm/s, the force that the control core asked for in N.
+/// A pose in short: time in s, depth in mm, speed in mm/s, the force that the control core asked
+/// for in N.
 pub type PoseRow = [f64; 4];
 
 /// A trainee's insertions so far.

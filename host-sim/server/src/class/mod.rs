@@ -1,12 +1,14 @@
-//! A class: many devices, one instructor. Each device publishes its pose, events and scores over Zenoh; the instructor's
-//! program gathers them and shows them in a page.
+//! A class: many devices, one instructor. Each device publishes its pose, events and scores over
+//! Zenoh; the instructor's program gathers them and shows them in a page.
 //!
-//! [`publisher`] turns what a session brings into messages, [`board`] keeps the newest of every device, `network` carries the
-//! messages. Only `network` needs the feature `class`: without it, [`join`] and [`listen`] say which build has it.
+//! [`publisher`] turns what a session brings into messages, [`board`] keeps the newest of every
+//! device, `network` carries the messages. Only `network` needs the feature `class`: without it,
+//! [`join`] and [`listen`] say which build has it.
 //!
-//! A device only publishes: it subscribes to nothing and answers nothing, so that nobody on the network can start torque.
-//! It publishes from a thread of its own that reads the session's bounded queue, so that the control path never waits for
-//! the network. This module may not touch the device, the link or a recording's file.
+//! A device only publishes: it subscribes to nothing and answers nothing, so that nobody on the
+//! network can start torque. It publishes from a thread of its own that reads the session's bounded
+//! queue, so that the control path never waits for the network. This module may not touch the
+//! device, the link or a recording's file.
 
 pub mod board;
 pub mod message;
@@ -25,7 +27,8 @@ pub use network::{Listener, Membership, join, listen};
 /// The default address of the instructor's program: Zenoh's own port on this computer.
 pub const USUAL_ADDRESS: SocketAddr = SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), 7_447);
 
-/// Name of a class or of a device in it: a part of a Zenoh key, hence 1 to 40 letters, digits or `._-`.
+/// Name of a class or of a device in it: a part of a Zenoh key, hence 1 to 40 letters, digits or
+/// `._-`.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Name(String);
 
@@ -62,7 +65,8 @@ impl FromStr for Name {
     }
 }
 
-/// The meeting point of a class: on the instructor's side the address to listen on, on a device's side the one to connect to.
+/// The meeting point of a class: on the instructor's side the address to listen on, on a device's
+/// side the one to connect to.
 #[derive(Clone, Debug)]
 pub struct Meeting {
     /// Name of the class.
@@ -74,7 +78,8 @@ pub struct Meeting {
 }
 
 impl Meeting {
-    /// Checks that nobody but this computer can take part without a token; `flag` is the option that gave the address.
+    /// Checks that nobody but this computer can take part without a token; `flag` is the option
+    /// that gave the address.
     pub fn check(&self, flag: &str) -> Result<(), String> {
         if self.address.port() == 0 {
             return Err(format!("{flag} {} needs a port that both sides know, such as 7447", self.address));

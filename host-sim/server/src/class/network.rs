@@ -1,6 +1,7 @@
-//! Carries a class's messages over Zenoh. The instructor's program listens; every device connects to it, again and again
-//! until it is there, and publishes. No scouting: nobody is found who was not named. Where a token is given, both ends have
-//! to prove that they know it before anything is taken.
+//! Carries a class's messages over Zenoh. The instructor's program listens; every device connects
+//! to it, again and again until it is there, and publishes. No scouting: nobody is found who was
+//! not named. Where a token is given, both ends have to prove that they know it before anything is
+//! taken.
 
 use super::board::Board;
 use super::message::Kind;
@@ -18,15 +19,16 @@ use zenoh::pubsub::{Publisher, Subscriber};
 use zenoh::qos::CongestionControl;
 use zenoh::{Config, Session, Wait};
 
-/// Between two looks at the session: 25 messages a second with forty poses each. A message costs both ends far more than a
-/// pose in it, and the instructor's page changes ten times a second.
+/// Between two looks at the session: 25 messages a second with forty poses each. A message costs
+/// both ends far more than a pose in it, and the instructor's page changes ten times a second.
 const PERIOD: Duration = Duration::from_millis(40);
 /// The longest wait at the program's end for a goodbye that the network may not take.
 const GOODBYE: Duration = Duration::from_millis(500);
-/// The most bytes of a message put together from pieces; Zenoh's own limit is 1 GiB. The board takes half of it.
+/// The most bytes of a message put together from pieces; Zenoh's own limit is 1 GiB. The board
+/// takes half of it.
 const LONGEST_TRANSFER: &str = "131072";
-/// The longest time in which a connection must authenticate, ms. Zenoh's own limit is 10 s with 100 of them at a time: silent ones would keep
-/// devices out for so long.
+/// The longest time in which a connection must authenticate, ms. Zenoh's own limit is 10 s with 100
+/// of them at a time: silent ones would keep devices out for so long.
 const ACCEPT_TIMEOUT_MS: &str = "2000";
 /// Connections at a time that have not said who they are; one more is closed.
 const ACCEPT_PENDING: &str = "400";
@@ -64,7 +66,8 @@ impl Drop for Listener {
     }
 }
 
-/// Publishes what `session` does as `name`, from a thread of its own. The instructor may come and go.
+/// Publishes what `session` does as `name`, from a thread of its own. The instructor may come and
+/// go.
 pub fn join(
     session: NeedleSession,
     device: Device,
@@ -190,7 +193,8 @@ fn open(meeting: &Meeting, side: Side) -> Result<Session, zenoh::Error> {
     zenoh::open(config).wait()
 }
 
-/// The token as Zenoh reads it: in a file that only this user can read, gone as soon as it has been read.
+/// The token as Zenoh reads it: in a file that only this user can read, gone as soon as it has been
+/// read.
 struct Dictionary(PathBuf);
 
 impl Dictionary {

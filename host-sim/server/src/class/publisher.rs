@@ -44,7 +44,8 @@ impl ClassPublisher {
         Self { device, ..Self::default() }
     }
 
-    /// The messages for what has arrived since the last call; every pose of it is in them. `now` is any clock that goes on.
+    /// The messages for what has arrived since the last call; every pose of it is in them. `now` is
+    /// any clock that goes on.
     pub fn take(&mut self, batch: Batch, now: Duration) -> Vec<Message> {
         let mut told = Vec::new();
         if let Some(scene) = batch.scene.clone() {

@@ -64,7 +64,8 @@ impl Events {
         self.total
     }
 
-    /// Those after the first `told`, oldest first; a stream that is far behind misses the oldest of them.
+    /// Those after the first `told`, oldest first; a stream that is far behind misses the oldest of
+    /// them.
     pub fn since(&self, told: u64) -> impl Iterator<Item = &messages::Event> {
         let new = self.total.saturating_sub(told).min(self.last.len() as u64) as usize;
         self.last.range(self.last.len() - new..)
@@ -148,7 +149,8 @@ pub(super) async fn run(mut subscription: Subscription, publish: watch::Sender<S
     }
 }
 
-/// Returns an event's effect on the latched fault: one latches, a start clears it, others have none.
+/// Returns an event's effect on the latched fault: one latches, a start clears it, others have
+/// none.
 fn fault(happening: &Happening) -> Option<Option<String>> {
     match happening.event.kind {
         link::frames::EventKind::Fault { cause } => Some(Some(cause.to_string())),

@@ -1,10 +1,12 @@
-//! Live streams to the tools that people already use: OpenIGTLink (3D Slicer), a WebSocket of JSON poses (Unity and the
-//! like), UDP JSON (PlotJuggler), Foxglove's WebSocket.
+//! Live streams to the tools that people already use: OpenIGTLink (3D Slicer), a WebSocket of JSON
+//! poses (Unity and the like), UDP JSON (PlotJuggler), Foxglove's WebSocket.
 //!
-//! `feed` keeps the newest pose of a session and nothing else; each stream sends it at its own pace, so that a stalled or
-//! slow client loses poses and costs nobody anything. No stream takes an order: none can start torque.
+//! `feed` keeps the newest pose of a session and nothing else; each stream sends it at its own
+//! pace, so that a stalled or slow client loses poses and costs nobody anything. No stream takes an
+//! order: none can start torque.
 //!
-//! This module may not touch the device, the link or a recording: it knows a [`Session`] and nothing behind it.
+//! This module may not touch the device, the link or a recording: it knows a [`Session`] and
+//! nothing behind it.
 
 mod feed;
 #[cfg(feature = "foxglove")]

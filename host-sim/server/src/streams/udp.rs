@@ -1,4 +1,5 @@
-//! One JSON datagram a pose, as PlotJuggler's UDP server reads it. What is not listened to is lost, which costs nothing.
+//! One JSON datagram a pose, as PlotJuggler's UDP server reads it. What is not listened to is lost,
+//! which costs nothing.
 
 use super::feed::{NeedlePose, Snapshot};
 use super::spec::Token;

@@ -1,5 +1,5 @@
-//! The ultrasound image for streams, computed as in the page: tissue and probe follow the session, whoever looks at a page or not. It costs
-//! nothing while nobody watches.
+//! The ultrasound image for streams, computed as in the page: tissue and probe follow the session,
+//! whoever looks at a page or not. It costs nothing while nobody watches.
 
 use super::feed::Snapshot;
 use device_sim::session::{ProbeView, Scene};
@@ -30,7 +30,8 @@ const PROBE: ProbeView = ProbeView {
     share_in_plane: 0.0,
     tip_seen: false,
 };
-/// The numbers of a vessel and of its far wall, which [`Picture::new`] reads beside those of [`TISSUES`].
+/// The numbers of a vessel and of its far wall, which [`Picture::new`] reads beside those of
+/// [`TISSUES`].
 const VESSEL: f32 = 7.0;
 const FAR_WALL: f32 = 8.0;
 

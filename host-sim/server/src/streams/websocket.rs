@@ -1,5 +1,5 @@
-//! One JSON text a pose over a WebSocket. Nothing that a client says is listened to, so that none can move or start anything;
-//! a page of another site may not connect from this computer's browser.
+//! One JSON text a pose over a WebSocket. Nothing that a client says is listened to, so that none
+//! can move or start anything; a page of another site may not connect from this computer's browser.
 
 use super::feed::Snapshot;
 use super::spec::Token;
@@ -77,7 +77,8 @@ async fn connect(
         .on_upgrade(move |socket| stream(socket, shared.newest, place))
 }
 
-/// Programs that are no browser send no origin; a page of this computer is welcome, whatever its port.
+/// Programs that are no browser send no origin; a page of this computer is welcome, whatever its
+/// port.
 fn is_from_here(headers: &HeaderMap) -> bool {
     let Some(origin) = headers.get(header::ORIGIN) else { return true };
     let Ok(origin) = origin.to_str() else { return false };

@@ -1,5 +1,5 @@
-//! One page: what it is sent, and what it asks for. The two ways are independent, so that the stop of a page that is too
-//! slow to read still arrives.
+//! One page: what it is sent, and what it asks for. The two ways are independent, so that the stop
+//! of a page that is too slow to read still arrives.
 
 use super::shared::Shared;
 use axum::extract::ws::{CloseFrame, Message, Utf8Bytes, WebSocket, close_code};
@@ -13,8 +13,8 @@ use std::sync::atomic::Ordering;
 use std::time::Duration;
 use tokio::time::{Instant, MissedTickBehavior, interval, timeout};
 
-/// Between two frames to the page: half of the 16.7 ms of a screen, so that news waits 4 ms on average instead of 8, and
-/// each picture has some.
+/// Between two frames to the page: half of the 16.7 ms of a screen, so that news waits 4 ms on
+/// average instead of 8, and each picture has some.
 const FRAME_PERIOD: Duration = Duration::from_millis(8);
 /// Between two frames that have nothing new of the needle.
 const QUIET_PERIOD: Duration = Duration::from_millis(250);

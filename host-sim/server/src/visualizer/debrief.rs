@@ -1,4 +1,5 @@
-//! The debrief of the last recording at `/debrief`. It is made of the file in a thread of its own, because a long recording takes seconds.
+//! The debrief of the last recording at `/debrief`. It is made of the file in a thread of its own,
+//! because a long recording takes seconds.
 
 use axum::Router;
 use axum::extract::State;

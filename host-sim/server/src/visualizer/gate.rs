@@ -1,5 +1,6 @@
-//! Who may see the page. This computer may, from the program's own page. Another one may only where the program listens to a network, and
-//! with the token that the program printed: it comes once in the address and then in a cookie.
+//! Who may see the page. This computer may, from the program's own page. Another one may only where
+//! the program listens to a network, and with the token that the program printed: it comes once in
+//! the address and then in a cookie.
 
 use crate::bounded_listener::BoundedListener;
 use axum::extract::connect_info::Connected;
@@ -30,7 +31,8 @@ pub(super) struct Gate {
 }
 
 impl Gate {
-    /// A gate with a new token of 128 random bits; an error where the system gives no random numbers.
+    /// A gate with a new token of 128 random bits; an error where the system gives no random
+    /// numbers.
     pub(super) fn with_token() -> Result<(Self, String), getrandom::Error> {
         let mut bits = [0; 16];
         getrandom::fill(&mut bits)?;
@@ -39,7 +41,8 @@ impl Gate {
     }
 
     fn knows(&self, said: Option<&str>) -> bool {
-        // Both are public in length; every letter is looked at, so that the time says nothing of where they differ.
+        // Both are public in length; every letter is looked at, so that the time says nothing of
+        // where they differ.
         let same = |token: &str, said: &str| {
             token.len() == said.len()
                 && token.bytes().zip(said.bytes()).fold(0, |all, (a, b)| all | (a ^ b)) == 0
@@ -53,7 +56,8 @@ pub(super) fn address_with(url: &str, token: &str) -> String {
     format!("{url}?{TOKEN}={token}")
 }
 
-/// Lets a request through, or says why not. A request with the right token in its address gets the cookie.
+/// Lets a request through, or says why not. A request with the right token in its address gets the
+/// cookie.
 pub(super) async fn pass(
     State(gate): State<Gate>,
     ConnectInfo(Peer(peer)): ConnectInfo<Peer>,
@@ -62,7 +66,8 @@ pub(super) async fn pass(
 ) -> Response {
     let headers = request.headers();
     if peer.ip().is_loopback() {
-        // What only shows a page may be asked for by anybody here; what moves or tells something, by the page alone.
+        // What only shows a page may be asked for by anybody here; what moves or tells something,
+        // by the page alone.
         let is_free = !matches!(request.uri().path(), "/live" | "/debrief");
         return match is_free || is_own_page(headers, true) {
             true => next.run(request).await,
@@ -102,8 +107,9 @@ fn in_cookie(headers: &HeaderMap) -> Option<&str> {
     all.split(';').find_map(|pair| pair.trim().strip_prefix(TOKEN)?.strip_prefix('='))
 }
 
-/// Any site that a person visits may open a WebSocket to this program and would drive the motor: the browser tells where the
-/// script came from, and that has to be here. On this computer (`is_local`) the name that was asked for has to be its own.
+/// Any site that a person visits may open a WebSocket to this program and would drive the motor:
+/// the browser tells where the script came from, and that has to be here. On this computer
+/// (`is_local`) the name that was asked for has to be its own.
 fn is_own_page(headers: &HeaderMap, is_local: bool) -> bool {
     let text = |name| headers.get(name).and_then(|value| value.to_str().ok());
     let Some(host) = text(header::HOST) else { return false };

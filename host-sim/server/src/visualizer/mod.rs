@@ -1,11 +1,15 @@
-//! The page: serves it from the program itself, streams to it what the device does, and passes on what a person does.
+//! The page: serves it from the program itself, streams to it what the device does, and passes on
+//! what a person does.
 //!
-//! [`device_sim::page::messages`] is what is said between server and page, [`device_sim::page::condense`] turns 10 kHz into what a
-//! picture needs, `server` and `connection` carry it, `watched` carries a page that only looks (a class) or agrees to steps (a guide),
-//! `debrief` serves what it is given for the last recording, `assets` holds the files of `host-sim/page`.
+//! [`device_sim::page::messages`] is what is said between server and page,
+//! [`device_sim::page::condense`] turns 10 kHz into what a picture needs, `server` and `connection`
+//! carry it, `watched` carries a page that only looks (a class) or agrees to steps (a guide),
+//! `debrief` serves what it is given for the last recording, `assets` holds the files of
+//! `host-sim/page`.
 //!
-//! This module may not touch the device, the link or a recording: it knows a [`device_sim::session::Session`] and nothing
-//! behind it. A page that is slow, asleep or gone costs the session nothing but its own bounded queue.
+//! This module may not touch the device, the link or a recording: it knows a
+//! [`device_sim::session::Session`] and nothing behind it. A page that is slow, asleep or gone
+//! costs the session nothing but its own bounded queue.
 
 mod assets;
 mod connection;

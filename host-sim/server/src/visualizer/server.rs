@@ -21,7 +21,8 @@ use std::sync::Arc;
 use std::thread::JoinHandle;
 use tokio::sync::oneshot;
 
-/// Longest message taken from a page, in bytes: an edited patient with all its layers has about 3,000.
+/// Longest message taken from a page, in bytes: an edited patient with all its layers has about
+/// 3,000.
 const LONGEST_MESSAGE: usize = 32_768;
 /// Connections at a time: eight pages with all their files. Whoever publishes does so to each.
 const MOST_CONNECTIONS: usize = 64;
@@ -101,7 +102,8 @@ impl Server {
         format!("http://{address}/")
     }
 
-    /// Returns the page's address for other computers, with its token; none where it is served to this one only.
+    /// Returns the page's address for other computers, with its token; none where it is served to
+    /// this one only.
     pub fn url_for_others(&self) -> Option<String> {
         let mut address = self.address;
         if address.ip().is_unspecified() {
@@ -135,7 +137,8 @@ impl Drop for Server {
     }
 }
 
-/// The address by which this computer is known in its network: the one that it would send from. Nothing is sent.
+/// The address by which this computer is known in its network: the one that it would send from.
+/// Nothing is sent.
 fn own_address() -> Option<IpAddr> {
     let socket = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, 0)).ok()?;
     // An address for documentation (RFC 5737), which nobody has.
@@ -153,8 +156,8 @@ pub fn serve(session: Session, port: u16) -> Result<Server, ServeError> {
     start(local(port), &DEVICE_PAGE, Router::new().route("/live", get(live).with_state(shared)))
 }
 
-/// The same at any address, with a debrief of the last recording, which `write` makes of its file, at `/debrief`. Other computers need
-/// the token of [`Server::url_for_others`].
+/// The same at any address, with a debrief of the last recording, which `write` makes of its file,
+/// at `/debrief`. Other computers need the token of [`Server::url_for_others`].
 pub fn serve_with_debrief(
     session: Session,
     address: SocketAddr,
@@ -171,7 +174,8 @@ pub fn serve_watched(watches: Watches, port: u16) -> Result<Server, ServeError> 
     start(local(port), &CLASS_PAGE, Router::new().route("/live", live))
 }
 
-/// Serves the page of a guide, which looks at what `watches` give and agrees by what `said` takes, as [`serve`] does.
+/// Serves the page of a guide, which looks at what `watches` give and agrees by what `said` takes,
+/// as [`serve`] does.
 pub fn serve_guide(watches: Watches, said: Said, port: u16) -> Result<Server, ServeError> {
     let live = get(watched::live).with_state(Watched { watches, said: Some(said) });
     start(local(port), &GUIDE_PAGE, Router::new().route("/live", live))

@@ -1,4 +1,5 @@
-//! A page that looks: it is sent a text whenever there is one. What it says goes to whoever listens, which is nobody for a class.
+//! A page that looks: it is sent a text whenever there is one. What it says goes to whoever
+//! listens, which is nobody for a class.
 
 use axum::extract::ws::{Message, WebSocket};
 use axum::extract::{State, WebSocketUpgrade};

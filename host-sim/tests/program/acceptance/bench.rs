@@ -1,4 +1,5 @@
-//! The control core of the device on the simulated mechanism, a needle in it and a hand that moves or lets go.
+//! The control core of the device on the simulated mechanism, a needle in it and a hand that moves
+//! or lets go.
 
 use control_core::config::Tissue;
 use control_core::controller::TickOutput;
@@ -59,7 +60,8 @@ impl Bench {
         Self::new(&profile, angle_deg, 4.0)
     }
 
-    /// At an angle to the skin, with rollers that hold the needle with `grip_n`; faded in, above the skin.
+    /// At an angle to the skin, with rollers that hold the needle with `grip_n`; faded in, above
+    /// the skin.
     pub(crate) fn new(profile: &Profile, angle_deg: f64, grip_n: f64) -> Self {
         let device = &profile.config.device;
         let radius_m = device.roller_radius.0.to_num::<f64>() * 1e-3;

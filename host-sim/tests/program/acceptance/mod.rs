@@ -1,5 +1,6 @@
-//! The requirements of the three papers on a simulator, a test for each sentence, under its name. They run the device's own control core
-//! on the simulated mechanism; `tests` runs the same core's laws in the flash image bit for bit.
+//! The requirements of the three papers on a simulator, a test for each sentence, under its name.
+//! They run the device's own control core on the simulated mechanism; `tests` runs the same core's
+//! laws in the flash image bit for bit.
 
 mod bench;
 
@@ -81,7 +82,8 @@ fn paper_001_condition_5_initial_slope_and_its_range() {
     // It is adjusted within a range, and refused outside.
     let refused = [4.0, 5.0, 90.0, 91.0].map(|deg| profile("adult").at_angle(deg).is_err());
     assert_eq!(refused, [true, false, false, true]);
-    // Within it the slope varies while the needle is in: what lies under the skin is met where that slope has it.
+    // Within it the slope varies while the needle is in: what lies under the skin is met where that
+    // slope has it.
     let vein = number(&adult, Tissue::Vessel);
     let met_mm = |to_deg: f64| {
         let mut bench = Bench::of("adult");
@@ -96,7 +98,8 @@ fn paper_001_condition_5_initial_slope_and_its_range() {
     }
 }
 
-/// Paper 002, II, need 1: "To allow the doctor to choose a needle insertion point in any place on the joint."
+/// Paper 002, II, need 1: "To allow the doctor to choose a needle insertion point in any place on
+/// the joint."
 #[test]
 fn paper_002_need_1_any_insertion_point() {
     // The point is chosen by zeroing the device there, in the direction that the needle then has.
@@ -117,8 +120,9 @@ fn paper_002_need_1_any_insertion_point() {
     }
 }
 
-/// Paper 002, II, need 2: "Once the insertion point is selected, the haptic interface must keep the same direction, and if it is
-/// necessary, the trajectory can be modified within the body if a prefixed maximum angle is not exceeded".
+/// Paper 002, II, need 2: "Once the insertion point is selected, the haptic interface must keep the
+/// same direction, and if it is necessary, the trajectory can be modified within the body if a
+/// prefixed maximum angle is not exceeded".
 #[test]
 fn paper_002_need_2_direction_held_up_to_a_largest_angle() {
     let mut bench = Bench::of("shoulder");
@@ -134,8 +138,8 @@ fn paper_002_need_2_direction_held_up_to_a_largest_angle() {
     assert!((bench.now().lateral_n - 2.0).abs() < 0.02, "{} N", bench.now().lateral_n);
 }
 
-/// Paper 002, II, need 3: "When the needle tip is penetrating the body, different body stiffness must be rendered, according to
-/// patient's profiles and pathologists."
+/// Paper 002, II, need 3: "When the needle tip is penetrating the body, different body stiffness
+/// must be rendered, according to patient's profiles and pathologists."
 #[test]
 fn paper_002_need_3_stiffness_by_tissue_and_patient() {
     let skin_n = |name: &str| {
@@ -158,7 +162,8 @@ fn paper_002_need_3_stiffness_by_tissue_and_patient() {
     assert!(forces.windows(2).all(|pair| pair[1] > 1.1 * pair[0]), "{forces:?}");
 }
 
-/// Paper 002, II, need 4: "If the doctor stops his movement within the body, the needle must remain in the same position."
+/// Paper 002, II, need 4: "If the doctor stops his movement within the body, the needle must remain
+/// in the same position."
 #[test]
 fn paper_002_need_4_a_released_needle_stays() {
     for (name, depth_mm) in [("adult", 8.0), ("shoulder", 20.0), ("phantom", 7.0)] {
@@ -174,9 +179,10 @@ fn paper_002_need_4_a_released_needle_stays() {
     }
 }
 
-/// Paper 002, II, need 5: "The simulator must have support for the hand, as doctors lay his/her hand in the patient's limb during the
-/// injection, to stabilize himself during the puncture." The support itself is mechanical; what the needle has to do with it is that a hand
-/// which lies still may rest there with the needle in tissue.
+/// Paper 002, II, need 5: "The simulator must have support for the hand, as doctors lay his/her
+/// hand in the patient's limb during the injection, to stabilize himself during the puncture." The
+/// support itself is mechanical; what the needle has to do with it is that a hand which lies still
+/// may rest there with the needle in tissue.
 #[test]
 fn paper_002_need_5_a_hand_may_rest_with_the_needle_in() {
     let mut bench = Bench::of("shoulder");
@@ -186,14 +192,15 @@ fn paper_002_need_5_a_hand_may_rest_with_the_needle_in() {
     let begin = bench.seen.len();
     bench.rest(20.0);
     assert!((bench.tip_mm() - place_mm).abs() < 0.05, "it went from {place_mm} to {} mm", bench.tip_mm());
-    // Every four seconds the device asks a needle without a count for one; dry friction then keeps a few hundredths of a newton.
+    // Every four seconds the device asks a needle without a count for one; dry friction then keeps
+    // a few hundredths of a newton.
     assert!((bench.now().given_n - force_n).abs() < 0.06, "from {force_n} to {} N", bench.now().given_n);
     let resting = &bench.seen[begin..];
     assert!(resting.iter().all(|s| s.state == State::Friction), "it reads as resting in tissue");
 }
 
-/// Paper 000, conclusion: "The ability to model and detect layer transitions also provides haptic cues that help guide users during
-/// needle insertion."
+/// Paper 000, conclusion: "The ability to model and detect layer transitions also provides haptic
+/// cues that help guide users during needle insertion."
 #[test]
 fn paper_000_layer_transitions_are_detected_and_felt() {
     let phantom = profile("phantom");
@@ -214,8 +221,8 @@ fn paper_000_layer_transitions_are_detected_and_felt() {
     }
 }
 
-/// Paper 000, II C: "The simulation also detects and displays whether the needle intersects the vessel." (The page's tests look at
-/// what is displayed.)
+/// Paper 000, II C: "The simulation also detects and displays whether the needle intersects the
+/// vessel." (The page's tests look at what is displayed.)
 #[test]
 fn paper_000_vessel_intersection_is_detected() {
     let mut bench = Bench::of("phantom");

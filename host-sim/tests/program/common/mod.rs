@@ -26,7 +26,8 @@ pub(crate) fn run_well(arguments: &[&str]) -> String {
     String::from_utf8(output.stdout).expect("text")
 }
 
-/// Checks that it ends with `status` and says one clear line on standard error that contains every hint; the line.
+/// Checks that it ends with `status` and says one clear line on standard error that contains every
+/// hint; the line.
 pub(crate) fn refused(output: &Output, status: i32, hints: &[&str]) -> String {
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(status), "{said}");

@@ -1,4 +1,5 @@
-//! A virtual device in real time, as `host-sim run` runs it, and how late its control path was meanwhile.
+//! A virtual device in real time, as `host-sim run` runs it, and how late its control path was
+//! meanwhile.
 
 use device_sim::device::virtual_device::VirtualDevice;
 use device_sim::driver::Driver;
@@ -12,7 +13,8 @@ use server::run_loop::{Outcome, RunLoop};
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
-/// A firmware whose PC is silent for longer takes the torque away: nothing may hold the control path up for so long.
+/// A firmware whose PC is silent for longer takes the torque away: nothing may hold the control
+/// path up for so long.
 pub(crate) const HEARTBEAT_LIMIT: Duration = Duration::from_millis(200);
 
 /// The adult's session, and the end that feeds it.

@@ -1,5 +1,5 @@
-//! A virtual device in place of a board: in a thread of its own, in real time, with a cable that may be pulled. It does not
-//! wait for the PC, as a board does not.
+//! A virtual device in place of a board: in a thread of its own, in real time, with a cable that
+//! may be pulled. It does not wait for the PC, as a board does not.
 
 use super::pipe::{self, End};
 use device_sim::device::Wire;

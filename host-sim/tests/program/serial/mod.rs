@@ -1,4 +1,5 @@
-//! A serial device, over a pseudo-terminal pair: the virtual device's bytes behind the far end, unplugged and plugged in again.
+//! A serial device, over a pseudo-terminal pair: the virtual device's bytes behind the far end,
+//! unplugged and plugged in again.
 
 mod board;
 mod crashed;
@@ -24,7 +25,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// A plugged-in board: the far end of a pseudo-terminal with a wire to a device. Dropped, it is unplugged.
+/// A plugged-in board: the far end of a pseudo-terminal with a wire to a device. Dropped, it is
+/// unplugged.
 struct Plugged {
     path: PathBuf,
     unplug: Arc<AtomicBool>,
@@ -62,7 +64,8 @@ impl Plugged {
                     let Ok(count) = wire.read(&mut bytes, Duration::from_millis(1)) else { return };
                     outgoing.extend(&bytes[..count]);
                 }
-                // What the terminal's buffer does not take yet waits here, as in a board's endpoint.
+                // What the terminal's buffer does not take yet waits here, as in a board's
+                // endpoint.
                 match board.write(&outgoing) {
                     Ok(written) => drop(outgoing.drain(..written)),
                     Err(_) => std::thread::sleep(Duration::from_millis(1)),

@@ -1,4 +1,5 @@
-//! The tables of a debrief: figures side by side, which of two is better, and a row for each insertion.
+//! The tables of a debrief: figures side by side, which of two is better, and a row for each
+//! insertion.
 
 use super::Attempt;
 use crate::score::Insertion;

@@ -1,5 +1,6 @@
-//! A trainee's insertions on a page to print: the gesture over the anatomy, force against depth, the figures, two attempts compared,
-//! and what they say in words. It takes its figures from [`crate::score`] and computes none of its own.
+//! A trainee's insertions on a page to print: the gesture over the anatomy, force against depth,
+//! the figures, two attempts compared, and what they say in words. It takes its figures from
+//! [`crate::score`] and computes none of its own.
 
 mod figures;
 
@@ -33,7 +34,8 @@ pub struct Attempt {
     punctures: Vec<((f64, f64), String)>,
 }
 
-/// All insertions of a recording, judged by one profile or each by the one that it was recorded with.
+/// All insertions of a recording, judged by one profile or each by the one that it was recorded
+/// with.
 pub fn attempts(recording: &Recording, by: Option<&Profile>) -> Result<Vec<Attempt>, Error> {
     let mut attempts = Vec::new();
     each(recording, by, |span, judge, profile| {
@@ -77,8 +79,8 @@ fn attempt(
     }
 }
 
-/// The page; none of no attempt. The first and the last are compared, or an expert's best and the last, over the anatomy of the last
-/// one's patient.
+/// The page; none of no attempt. The first and the last are compared, or an expert's best and the
+/// last, over the anatomy of the last one's patient.
 pub fn html(attempts: &[Attempt], expert: &[Attempt]) -> Option<String> {
     let patient = &attempts.last()?.patient;
     let scene = patient.scene(Source::Virtual, None);
@@ -120,7 +122,8 @@ pub fn html(attempts: &[Attempt], expert: &[Attempt]) -> Option<String> {
     Some(sheet.finish())
 }
 
-/// Returns the quickest attempt that reached its goal without touching what was to be spared, else the quickest.
+/// Returns the quickest attempt that reached its goal without touching what was to be spared, else
+/// the quickest.
 fn best(attempts: &[Attempt]) -> Option<&Attempt> {
     let failed = |one: &Insertion| {
         let reached = match &one.target {

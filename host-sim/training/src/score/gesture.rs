@@ -1,11 +1,14 @@
-//! One insertion as a movement in the section that the picture shows: where the tip was, at 100 Hz. What follows from it (path,
-//! redirections, angle error, speed) is geometry; forces and walls are not its business.
+//! One insertion as a movement in the section that the picture shows: where the tip was, at 100 Hz.
+//! What follows from it (path, redirections, angle error, speed) is geometry; forces and walls are
+//! not its business.
 
 use std::ops::Range;
 
-/// Places a second: finer, the path would be made of the encoder's steps and of a tremor that no trainee can help.
+/// Places a second: finer, the path would be made of the encoder's steps and of a tremor that no
+/// trainee can help.
 pub const RATE_HZ: f64 = 100.0;
-/// A needle drawn back by less than this, or pushed in again by less, is still on the same way in, mm.
+/// A needle drawn back by less than this, or pushed in again by less, is still on the same way in,
+/// mm.
 const PASS_MM: f64 = 2.0;
 /// A new pass whose angle differs by less than this from the last one's has the same direction, °.
 const SAME_DIRECTION_DEG: f64 = 3.0;
@@ -37,7 +40,8 @@ pub struct Gesture {
 /// The error of the needle's angle, °.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct AngleError {
-    /// Root mean square, every mm of the way counting the same, so that a needle at rest adds nothing.
+    /// Root mean square, every mm of the way counting the same, so that a needle at rest adds
+    /// nothing.
     pub rms_deg: f64,
     /// Largest, with its sign: positive is too steep.
     pub largest_deg: f64,
@@ -46,14 +50,16 @@ pub struct AngleError {
 /// The number of times that the needle was pushed in before it left the skin again.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Passes {
-    /// Ways in: one, and one more whenever it was pushed in again by 2 mm after having been drawn back by 2 mm.
+    /// Ways in: one, and one more whenever it was pushed in again by 2 mm after having been drawn
+    /// back by 2 mm.
     pub passes: u32,
     /// Those of them, but the first, that went in another direction: by 3° or more.
     pub redirections: u32,
 }
 
 impl Gesture {
-    /// Returns places at [`RATE_HZ`] from places at any higher rate, each the mean of its hundredth of a second.
+    /// Returns places at [`RATE_HZ`] from places at any higher rate, each the mean of its hundredth
+    /// of a second.
     pub fn new(rate_hz: f64, places: impl IntoIterator<Item = Place>) -> Self {
         let many = ((rate_hz / RATE_HZ).round() as usize).max(1);
         let (mut means, mut sum, mut counted) = (Vec::new(), Place::default(), 0_usize);
@@ -94,7 +100,8 @@ impl Gesture {
         steps.map(|mm| mm * RATE_HZ).collect()
     }
 
-    /// Returns the error of the angle from `wanted_rad` along the whole way; `None` if the tip has not moved.
+    /// Returns the error of the angle from `wanted_rad` along the whole way; `None` if the tip has
+    /// not moved.
     pub(crate) fn angle_error(&self, wanted_rad: f64) -> Option<AngleError> {
         let (mut squares, mut way, mut largest) = (0.0, 0.0, 0.0_f64);
         for (place, mm) in self.places.iter().skip(1).zip(self.steps_mm()) {
@@ -108,7 +115,8 @@ impl Gesture {
         (way > 0.0).then(|| AngleError { rms_deg: (squares / way).sqrt(), largest_deg: largest })
     }
 
-    /// Returns the number of times that it was pushed in anew, and in another direction: that of a pass is the angle at its deepest place.
+    /// Returns the number of times that it was pushed in anew, and in another direction: that of a
+    /// pass is the angle at its deepest place.
     pub fn passes(&self) -> Passes {
         let Some(first) = self.places.first() else { return Passes::default() };
         let (mut inwards, mut turn, mut angles) = (true, *first, Vec::new());
@@ -159,7 +167,8 @@ mod tests {
 
     #[test]
     fn a_tip_that_turns_sweeps_an_arc() {
-        // A quarter of a circle of 10 mm: 15.708 mm, of which 50 chords leave out less than a thousandth.
+        // A quarter of a circle of 10 mm: 15.708 mm, of which 50 chords leave out less than a
+        // thousandth.
         let arc = gesture(&[(10.0, 0.0), (10.0, 90.0)]);
         assert!((arc.path_mm() - 15.708).abs() < 0.01, "{}", arc.path_mm());
         // Errors from 0° to 90° along equal steps: the root of a third of 90².

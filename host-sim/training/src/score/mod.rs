@@ -1,5 +1,6 @@
-//! A trainee's figures, insertion by insertion: time, path, force, punctures, the vessel, angle, smoothness. [`gesture`] is the movement,
-//! [`vessel`] what it did to the vessel, [`smoothness`] a measure of any movement; here they are put together.
+//! A trainee's figures, insertion by insertion: time, path, force, punctures, the vessel, angle,
+//! smoothness. [`gesture`] is the movement, [`vessel`] what it did to the vessel, [`smoothness`] a
+//! measure of any movement; here they are put together.
 
 pub mod gesture;
 mod probe;
@@ -32,7 +33,8 @@ pub struct Score {
     pub insertions: Vec<Insertion>,
 }
 
-/// One insertion: from the first touch of the outermost layer until the tip has left it, or the recording ends.
+/// One insertion: from the first touch of the outermost layer until the tip has left it, or the
+/// recording ends.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Insertion {
@@ -52,7 +54,8 @@ pub struct Insertion {
     pub vessel: bool,
     /// Depth along the needle at which the vessel was first touched, mm; none where it was not.
     pub vessel_contact_path_mm: Option<f64>,
-    /// The distance that the tip went on after the vessel's wall had given way, mm; none if it did not give way.
+    /// The distance that the tip went on after the vessel's wall had given way, mm; none if it did
+    /// not give way.
     pub overshoot_mm: Option<f64>,
     /// Time in the vessel's lumen, s.
     pub in_lumen_s: f64,
@@ -74,11 +77,14 @@ pub struct Insertion {
     pub hit: Vec<String>,
     /// The names of structures to be spared that were not touched.
     pub spared: Vec<String>,
-    /// The number of times that the needle was turned beyond the largest angle that the patient's fixture allows.
+    /// The number of times that the needle was turned beyond the largest angle that the patient's
+    /// fixture allows.
     pub barriers: u32,
-    /// Largest force across the needle that would have held its direction of entry, N; none where the patient has no fixture.
+    /// Largest force across the needle that would have held its direction of entry, N; none where
+    /// the patient has no fixture.
     pub largest_lateral_n: Option<f64>,
-    /// The number of times that the needle was pushed in: once, and again whenever it was after having been drawn back by 2 mm.
+    /// The number of times that the needle was pushed in: once, and again whenever it was after
+    /// having been drawn back by 2 mm.
     pub passes: u32,
     /// Those of them that went in another direction, by 3° or more.
     pub redirections: u32,
@@ -90,11 +96,13 @@ pub struct Insertion {
     pub angle_rms_error_deg: Option<f64>,
     /// Largest of it, with its sign, °.
     pub angle_largest_error_deg: Option<f64>,
-    /// Share of the time at which the ultrasound image showed the tip; none where no image was shown.
+    /// Share of the time at which the ultrasound image showed the tip; none where no image was
+    /// shown.
     pub tip_seen_share: Option<f64>,
     /// Share of the needle in tissue that lay in the image's plane, its mean over that time.
     pub in_plane_share: Option<f64>,
-    /// Spectral arc length of the tip's speed on the way in: about −1.4 where it is one smooth movement.
+    /// Spectral arc length of the tip's speed on the way in: about −1.4 where it is one smooth
+    /// movement.
     pub smoothness: Option<f64>,
 }
 
@@ -109,7 +117,8 @@ pub struct Span<'a> {
     pub end: u64,
 }
 
-/// All insertions of a recording, judged by one profile or each by the one that it was recorded with.
+/// All insertions of a recording, judged by one profile or each by the one that it was recorded
+/// with.
 pub fn score(recording: &Recording, by: Option<&Profile>) -> Result<Score, Error> {
     let mut insertions = Vec::new();
     each(recording, by, |span, judge, _| insertions.push(judge.insertion(span)))?;
@@ -153,7 +162,8 @@ pub fn spans(stretch: &Stretch) -> Vec<Span<'_>> {
 }
 
 impl Span<'_> {
-    /// The movement of its tip; `skin_tilt_rad` is what the tilt reads with the needle laid on the skin.
+    /// The movement of its tip; `skin_tilt_rad` is what the tilt reads with the needle laid on the
+    /// skin.
     pub fn gesture(&self, skin_tilt_rad: f64) -> Gesture {
         let hello = &self.stretch.hello;
         let places = self.samples().iter().map(|sample| Place {

@@ -1,12 +1,15 @@
-//! The share of the needle that the ultrasound image showed, from the page's messages about the probe.
+//! The share of the needle that the ultrasound image showed, from the page's messages about the
+//! probe.
 
 use control_core::TICK_HZ;
 use recording::messages::Probe;
 
-/// The page says at least once a second what the image shows; after this time without a word it shows none.
+/// The page says at least once a second what the image shows; after this time without a word it
+/// shows none.
 const LONGEST_TICKS: u64 = TICK_HZ as u64 * 3 / 2;
 
-/// The parts of the needle that the image showed, each as a mean over the time at which there was an image.
+/// The parts of the needle that the image showed, each as a mean over the time at which there was
+/// an image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Seen {
     /// Share of the time at which it showed the tip.
@@ -50,7 +53,8 @@ mod tests {
 
     #[test]
     fn the_time_at_which_the_tip_is_seen_is_counted() {
-        // From 1 to 3 s: seen from before the begin until 1.5 s, then beside the plane, seen again in the last 0.5 s.
+        // From 1 to 3 s: seen from before the begin until 1.5 s, then beside the plane, seen again
+        // in the last 0.5 s.
         let half = shares(&[(5_000, true), (15_000, false), (25_000, true)]);
         assert_eq!(half, Some((0.5, 0.625)));
         assert_eq!(shares(&[]), None);

@@ -1,6 +1,7 @@
-//! Smoothness of a movement as its spectral arc length (Balasubramanian, Melendez-Calderon, Roby-Brami and Burdet 2015,
-//! doi:10.1186/s12984-015-0090-9): the length of the line that the normalised spectrum of speed draws, with its sign turned.
-//! It knows a speed profile and nothing of needles.
+//! Smoothness of a movement as its spectral arc length (Balasubramanian, Melendez-Calderon,
+//! Roby-Brami and Burdet 2015, doi:10.1186/s12984-015-0090-9): the length of the line that the
+//! normalised spectrum of speed draws, with its sign turned. It knows a speed profile and nothing
+//! of needles.
 
 use std::f64::consts::TAU;
 
@@ -13,8 +14,9 @@ const PADDING: usize = 16;
 /// A movement in fewer samples than this has no spectrum to speak of.
 const FEWEST: usize = 8;
 
-/// Spectral arc length of `speed` (any unit, evenly sampled at `rate_hz`): about −1.4 for one smooth movement, the more negative the less
-/// smooth. None where nothing moved, or for too short a time.
+/// Spectral arc length of `speed` (any unit, evenly sampled at `rate_hz`): about −1.4 for one
+/// smooth movement, the more negative the less smooth. None where nothing moved, or for too short a
+/// time.
 pub(crate) fn spectral_arc_length(speed: &[f64], rate_hz: f64) -> Option<f64> {
     if speed.len() < FEWEST || rate_hz.is_nan() || rate_hz <= 0.0 {
         return None;
@@ -58,9 +60,10 @@ mod tests {
         (0..(seconds * RATE_HZ) as usize).map(|n| at(n as f64 / RATE_HZ)).collect()
     }
 
-    /// The spectrum of a Gaussian is `e^{−2π²σ²f²}`: it falls to 1/20 at f_c, and over x = f/f_c it is `20^{−x²}`, whatever
-    /// its σ. The length of that line from 0 to 1, by hand: chords between x = 0, ¼, ½, ¾ and 1, where it is 1, 0.8293, 0.4729,
-    /// 0.1854 and 0.05, are 0.3027 + 0.4353 + 0.3810 + 0.2843 = 1.4033; by Simpson's rule on `√(1 + (2·ln 20·x·20^{−x²})²)`, 1.4165.
+    /// The spectrum of a Gaussian is `e^{−2π²σ²f²}`: it falls to 1/20 at f_c, and over x = f/f_c it
+    /// is `20^{−x²}`, whatever its σ. The length of that line from 0 to 1, by hand: chords between
+    /// x = 0, ¼, ½, ¾ and 1, where it is 1, 0.8293, 0.4729, 0.1854 and 0.05, are 0.3027 + 0.4353 +
+    /// 0.3810 + 0.2843 = 1.4033; by Simpson's rule on `√(1 + (2·ln 20·x·20^{−x²})²)`, 1.4165.
     #[test]
     fn a_gaussian_movement_has_the_arc_length_worked_by_hand() {
         const BY_HAND: f64 = 1.4165;

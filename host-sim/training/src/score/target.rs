@@ -1,7 +1,9 @@
-//! The structures that an insertion was to reach and to spare, by name, from the device's events and the tip's place along the skin.
+//! The structures that an insertion was to reach and to spare, by name, from the device's events
+//! and the tip's place along the skin.
 //!
-//! A target is a layer, or a part of it that ends to either side: layers of the device go on for ever, so that a bursa is missed here only
-//! where its patient says how far it reaches. What the hand feels there is the layer all the same.
+//! A target is a layer, or a part of it that ends to either side: layers of the device go on for
+//! ever, so that a bursa is missed here only where its patient says how far it reaches. What the
+//! hand feels there is the layer all the same.
 
 use super::gesture::Place;
 use device_sim::profile::{Beside, Goal};
@@ -34,8 +36,8 @@ pub struct Reached {
     pub passed_beside: u32,
 }
 
-/// Reads `events`, which are in their order in time, of the insertion from `begin` to `end`. `along_mm` tells where the tip was along the
-/// skin at a tick, and a tick lasts `tick_s`.
+/// Reads `events`, which are in their order in time, of the insertion from `begin` to `end`.
+/// `along_mm` tells where the tip was along the skin at a tick, and a tick lasts `tick_s`.
 pub fn reached(
     events: &[Event],
     (begin, end): (u64, u64),
@@ -46,7 +48,8 @@ pub fn reached(
     walk(events, (begin, end), target, along_mm, tick_s).0
 }
 
-/// Does the same and returns the visits of the target too, each from its first tick to the tick after its last.
+/// Does the same and returns the visits of the target too, each from its first tick to the tick
+/// after its last.
 pub(super) fn walk(
     events: &[Event],
     (begin, end): (u64, u64),
@@ -114,7 +117,8 @@ pub(crate) fn hit_and_spared(
     (names(hit), names(left))
 }
 
-/// Counts how often the tip came into a structure beside the way, and adds each structure's name to what was hit or spared.
+/// Counts how often the tip came into a structure beside the way, and adds each structure's name to
+/// what was hit or spared.
 pub(super) fn beside_hits(
     places: &[Place],
     beside: &[Beside],

@@ -1,10 +1,11 @@
-//! The results of a procedure's tasks (tourniquet, plunger, catheter): done, missed, at the wrong place or in the wrong order, and how many
-//! of the mistakes are critical.
+//! The results of a procedure's tasks (tourniquet, plunger, catheter): done, missed, at the wrong
+//! place or in the wrong order, and how many of the mistakes are critical.
 //!
-//! The rule. A task is done when it was done with the tip where the procedure wants it, and no task that comes before it in the procedure
-//! was left for later. A task before it that was never done is one mistake, not two. A mistake that is repaired does not count, unless it is
-//! critical: an injection cannot be taken back. Between two insertions, what was done before the first task of the procedure counts for
-//! neither: it came too late for the one, and the other has not begun.
+//! The rule. A task is done when it was done with the tip where the procedure wants it, and no task
+//! that comes before it in the procedure was left for later. A task before it that was never done
+//! is one mistake, not two. A mistake that is repaired does not count, unless it is critical: an
+//! injection cannot be taken back. Between two insertions, what was done before the first task of
+//! the procedure counts for neither: it came too late for the one, and the other has not begun.
 
 use super::{Judge, Span};
 use device_sim::procedure::task::{Mistake, Task, TipPlace};
@@ -32,7 +33,8 @@ pub struct TaskResult {
     pub mistake: Option<Mistake>,
     /// True if the mistake is critical.
     pub is_critical: bool,
-    /// The tip's place when the task was done: `outside`, `target`, or the name of what it was in; none where it was missed.
+    /// The tip's place when the task was done: `outside`, `target`, or the name of what it was in;
+    /// none where it was missed.
     pub tip: Option<String>,
 }
 
@@ -110,7 +112,8 @@ pub(super) fn judge(tasks: &[Task], done: &[Done]) -> Tasks {
     Tasks { critical: count(true) as u32, non_critical: count(false) as u32, list }
 }
 
-/// The result of one task: its first critical mistake, else that it was done, else its first mistake.
+/// The result of one task: its first critical mistake, else that it was done, else its first
+/// mistake.
 fn result(tasks: &[Task], number: usize, done: &[Done]) -> TaskResult {
     let task = &tasks[number];
     let is_critical = |mistake: &Mistake| task.critical.contains(mistake);
@@ -250,8 +253,8 @@ mod tests {
         sequence.split_whitespace().map(one).collect()
     }
 
-    /// Judges each sequence and compares critical, non-critical and the mistakes in the order of the procedure: `-` where it was done,
-    /// else missed, place or order.
+    /// Judges each sequence and compares critical, non-critical and the mistakes in the order of
+    /// the procedure: `-` where it was done, else missed, place or order.
     fn check(tasks: &[Task], table: &[(&str, u32, u32, &str)]) {
         for (sequence, critical, non_critical, mistakes) in table {
             let found = judge(tasks, &from_first(done(tasks, sequence)));
@@ -270,7 +273,8 @@ mod tests {
         }
     }
 
-    /// Tests each task as the guideline has it: on before the puncture, catheter in the lumen, off before the needle is out.
+    /// Tests each task as the guideline has it: on before the puncture, catheter in the lumen, off
+    /// before the needle is out.
     #[test]
     fn mistakes_of_a_venepuncture_are_counted() {
         let on = "tourniquet_on@outside ";

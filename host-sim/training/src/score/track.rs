@@ -1,5 +1,5 @@
-//! Layers that were met again after they had given way: in the needle's own track, where they are open, or beside it, where they are whole.
-//! From the device's events alone.
+//! Layers that were met again after they had given way: in the needle's own track, where they are
+//! open, or beside it, where they are whole. From the device's events alone.
 
 use link::frames::{Event, EventKind};
 
@@ -8,11 +8,13 @@ use link::frames::{Event, EventKind};
 pub struct MetAgain {
     /// Layers that were passed without giving way, because they had before: in the track.
     pub in_track: u32,
-    /// Layers that gave way once more: beside the track, or of a law whose walls close behind the needle.
+    /// Layers that gave way once more: beside the track, or of a law whose walls close behind the
+    /// needle.
     pub whole: u32,
 }
 
-/// Reads `events`, which are in their order in time: what was met again from `begin` to `end`, and had given way at any time before.
+/// Reads `events`, which are in their order in time: what was met again from `begin` to `end`, and
+/// had given way at any time before.
 pub(crate) fn met_again(events: &[Event], (begin, end): (u64, u64)) -> MetAgain {
     let mut again = MetAgain::default();
     let mut given = [false; 8];

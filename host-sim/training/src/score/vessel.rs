@@ -1,5 +1,6 @@
-//! The needle's effect on the vessel, from the device's events: contact, lumen, far wall, structures that it should have spared. It counts
-//! ticks and layers, and knows no lengths or forces.
+//! The needle's effect on the vessel, from the device's events: contact, lumen, far wall,
+//! structures that it should have spared. It counts ticks and layers, and knows no lengths or
+//! forces.
 
 use link::frames::{Event, EventKind};
 
@@ -81,8 +82,8 @@ mod tests {
         Targets { vessel: Some(VESSEL), far_wall: Some(FAR), spared: vec![FAR] }
     }
 
-    /// Contact at 100, into the lumen at 150, through the far wall at 400, drawn back into the lumen at 900, out of the vessel at
-    /// 1,000: 250 and 100 ticks in the lumen, worked by hand.
+    /// Contact at 100, into the lumen at 150, through the far wall at 400, drawn back into the
+    /// lumen at 900, out of the vessel at 1,000: 250 and 100 ticks in the lumen, worked by hand.
     #[test]
     fn a_through_puncture_counts_both_visits_of_the_lumen() {
         let told = events(&[

@@ -289,8 +289,9 @@ fn endpoint_of(offset: u64) -> Option<(usize, u64)> {
 
 impl Device for Core {
     fn pulls_up(&self) -> bool {
-        // The transceiver is on, VBUS is not looked for on a pin that this board does not wire to the core (34.16.3,
-        // NOVBUSSENS), the firmware configured the core, and it isn't disconnected.
+        // The transceiver is on, VBUS is not looked for on a pin that this board does not wire to
+        // the core (34.16.3, NOVBUSSENS), the firmware configured the core, and it isn't
+        // disconnected.
         self.stored(GCCFG) & (GCCFG_PWRDWN | GCCFG_NOVBUSSENS) == GCCFG_PWRDWN | GCCFG_NOVBUSSENS
             && self.stored(GAHBCFG) & GAHBCFG_GINT != 0
             && self.stored(DCTL) & DCTL_SDIS == 0

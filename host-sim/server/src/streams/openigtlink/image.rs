@@ -1,4 +1,5 @@
-//! The ultrasound image as an IMAGE message of OpenIGTLink version 1, and its probe as a TRANSFORM: 3D Slicer shows the image at its place.
+//! The ultrasound image as an IMAGE message of OpenIGTLink version 1, and its probe as a TRANSFORM:
+//! 3D Slicer shows the image at its place.
 
 use super::message::message;
 use crate::streams::ultrasound_image::{COLUMNS, Image, ROWS};
@@ -6,8 +7,8 @@ use crate::streams::ultrasound_image::{COLUMNS, Image, ROWS};
 /// Names in Slicer.
 const ULTRASOUND: &str = "Ultrasound";
 const PROBE: &str = "Probe";
-/// Version of the image's own header, components of a pixel, the type of an 8-bit number without sign, big-endian, and axes as they are
-/// (right, anterior, superior).
+/// Version of the image's own header, components of a pixel, the type of an 8-bit number without
+/// sign, big-endian, and axes as they are (right, anterior, superior).
 const FORMAT: [u8; 6] = [0, 1, 1, 3, 1, 1];
 
 /// Both messages, one after the other.
@@ -73,7 +74,8 @@ mod tests {
         assert_eq!(own[..12], [0, 1, 1, 3, 1, 1, 1, 0, 2, 0, 0, 1], "256 by 512 by 1, 8 bits");
         let floats: Vec<f32> =
             own[12..60].chunks(4).map(|four| f32::from_be_bytes(four.try_into().expect("four"))).collect();
-        // Columns along the skin, rows down, then across; the middle is half the depth below the face.
+        // Columns along the skin, rows down, then across; the middle is half the depth below the
+        // face.
         assert_eq!(floats, [0.1, 0.0, 0.0, 0.0, 0.0, -0.1, 0.0, 0.1, 0.0, 13.0, 0.0, -26.6]);
         assert_eq!(own[60..72], [0, 0, 0, 0, 0, 0, 1, 0, 2, 0, 0, 1]);
     }

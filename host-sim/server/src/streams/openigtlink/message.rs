@@ -1,5 +1,6 @@
-//! The bytes of OpenIGTLink version 1 messages, after the protocol's specification (openigtlink.org, "Protocol" v2): a header
-//! of 58 bytes, big-endian, then the body, whose CRC-64 the header carries.
+//! The bytes of OpenIGTLink version 1 messages, after the protocol's specification
+//! (openigtlink.org, "Protocol" v2): a header of 58 bytes, big-endian, then the body, whose CRC-64
+//! the header carries.
 
 use crate::streams::feed::{NeedlePose, Snapshot};
 use crc::{CRC_64_ECMA_182, Crc};
@@ -49,8 +50,8 @@ impl Status {
     }
 }
 
-/// The tip in mm and the needle's direction, in the axes of [`NeedlePose::tip_mm`]. The third axis of the transform points back
-/// along the needle, the second one across.
+/// The tip in mm and the needle's direction, in the axes of [`NeedlePose::tip_mm`]. The third axis
+/// of the transform points back along the needle, the second one across.
 pub(super) fn transform(pose: &NeedlePose) -> Vec<u8> {
     let [along, _, out] = pose.direction;
     // Columns of a rotation: normal to the needle in its plane, across, back along the needle.
@@ -89,11 +90,13 @@ pub(super) fn string_length(header: &[u8; HEADER]) -> Option<usize> {
     (is_string && (4..=LONGEST_STRING).contains(&length)).then_some(length as usize)
 }
 
-/// The text in the body of a STRING: encoding, length, bytes. Version 2 puts a header of its own before and metadata after.
+/// The text in the body of a STRING: encoding, length, bytes. Version 2 puts a header of its own
+/// before and metadata after.
 pub(super) fn string_text(body: &[u8]) -> Option<&[u8]> {
     let at =
         |offset: usize| Some(usize::from(u16::from_be_bytes(body.get(offset..offset + 2)?.try_into().ok()?)));
-    // Version 2 begins with the size of its extended header, 12; version 1 with the encoding of the text, 3.
+    // Version 2 begins with the size of its extended header, 12; version 1 with the encoding of the
+    // text, 3.
     let begin = if at(0)? == 12 { 12 } else { 0 };
     let length = at(begin + 2)?;
     body.get(begin + 4..begin + 4 + length)

@@ -1,8 +1,9 @@
-//! OpenIGTLink, 3D Slicer's way: the needle's pose and the probe's as TRANSFORM messages, the ultrasound image as IMAGE messages, the
-//! device's condition as STATUS messages.
+//! OpenIGTLink, 3D Slicer's way: the needle's pose and the probe's as TRANSFORM messages, the
+//! ultrasound image as IMAGE messages, the device's condition as STATUS messages.
 //!
-//! [`message`] is the protocol's bytes, `image` those of an image and its probe. Written here because the crate of that name brings a
-//! TLS library and a logger for what is a header of 58 bytes.
+//! [`message`] is the protocol's bytes, `image` those of an image and its probe. Written here
+//! because the crate of that name brings a TLS library and a logger for what is a header of 58
+//! bytes.
 
 mod image;
 mod message;

@@ -1,0 +1,118 @@
+//! A plot that shows its values under the pointer: its frame with round ticks and units, and the
+//! mapping of values to places. Plain SVG; without [`SCRIPT`] it shows the same curves.
+
+use crate::drawing::{decimals, round_step, ticks};
+use crate::safe;
+use std::fmt::Write as _;
+
+/// Shows the values of the paths that have a `data-name` under the pointer, and a stretch alone
+/// once it is dragged over. For the end of a page's body; the page's style gives colours to
+/// `.cursor` and `.chosen`.
+pub const SCRIPT: &str = include_str!("plot.js");
+
+/// Size of a plot and its margins, in its own units.
+const WIDE: f64 = 640.0;
+/// The height of a frame, in drawing units: places run from 0 at the top to this.
+pub const HIGH: f64 = 190.0;
+const LEFT: f64 = 72.0;
+const TOP: f64 = 16.0;
+const BOTTOM: f64 = 32.0;
+/// Room between the curves and the frame.
+const EDGE: f64 = 6.0;
+
+/// Ticks of a range.
+const TICKS: f64 = 6.0;
+
+/// A tick's label: as many decimals as tell it from its neighbours.
+fn label(value: f64, step: f64) -> String {
+    let size = value.abs().max(step);
+    if size >= 1e5 || step < 1e-4 {
+        let digits = (size.log10().floor() - step.log10().floor()).clamp(0.0, 6.0) as usize;
+        return if value == 0.0 { "0".into() } else { format!("{value:.digits$e}") };
+    }
+    format!("{:.*}", decimals(step), value + 0.0)
+}
+
+/// A frame with its ticks, under the title of its upright axis; returns the mapping of values to
+/// places. [`close`] ends it. `plot.js` reads the ranges and shows the values of the paths that
+/// have a `data-name`.
+pub fn frame(
+    out: &mut String,
+    x: (f64, f64),
+    y: (f64, f64),
+    x_label: &str,
+    y_label: &str,
+) -> impl Fn(f64, f64) -> (f64, f64) + use<> {
+    let (x_label, y_label) = (safe(x_label), safe(y_label));
+    let _ = write!(
+        out,
+        "<div class=plot><p class=axis>{y_label}</p><svg viewBox=\"0 -{TOP} {WIDE} {}\" role=img data-of=\"{x_label}\" \
+         data-x=\"{:e} {:e}\" data-y=\"{:e} {:e}\" data-box=\"{LEFT} {} {EDGE} {}\"><title>{y_label} over {x_label}</title>",
+        TOP + HIGH + BOTTOM,
+        x.0,
+        x.1,
+        y.0,
+        y.1,
+        WIDE - EDGE,
+        HIGH - EDGE
+    );
+    let at = move |a: f64, b: f64| {
+        let px = LEFT + (a - x.0) / (x.1 - x.0).max(1e-300) * (WIDE - LEFT - EDGE);
+        let py = EDGE + (y.1 - b) / (y.1 - y.0).max(1e-300) * (HIGH - 2.0 * EDGE);
+        (px, py.clamp(0.0, HIGH))
+    };
+    let (up, along) = (round_step((y.1 - y.0) / TICKS), round_step((x.1 - x.0) / TICKS));
+    for value in ticks(y.0, y.1, up) {
+        let (_, py) = at(x.0, value);
+        let _ = write!(
+            out,
+            "<line class=grid x1={LEFT} x2={WIDE} y1={py:.1} y2={py:.1} /><text x={} y={:.1} text-anchor=end>{}</text>",
+            LEFT - 5.0,
+            py + 3.0,
+            label(value, up)
+        );
+    }
+    for value in ticks(x.0, x.1, along) {
+        let (px, _) = at(value, y.0);
+        let anchor = if px > WIDE - 24.0 { "end" } else { "middle" };
+        let _ = write!(
+            out,
+            "<line class=grid x1={px:.1} x2={px:.1} y1={} y2={HIGH} /><text x={px:.1} y={} text-anchor={anchor}>{}</text>",
+            HIGH - 5.0,
+            HIGH + 24.0,
+            label(value, along)
+        );
+    }
+    at
+}
+
+/// Ends a frame, with the title of its level axis.
+pub fn close(out: &mut String, x_label: &str) {
+    let _ = write!(out, "</svg><p class=\"axis level\">{}</p></div>", safe(x_label));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn labels_of_ticks_differ_from_each_other() {
+        for (low, high) in [(-0.0137, 0.0141), (0.0, 24.813), (-371.0, 9.0), (1e-9, 4.4e-9), (0.2, 0.21)] {
+            let step = round_step((high - low) / 5.0);
+            let labels: Vec<String> = ticks(low, high, step).into_iter().map(|t| label(t, step)).collect();
+            let distinct: std::collections::BTreeSet<&String> = labels.iter().collect();
+            assert_eq!(distinct.len(), labels.len(), "{labels:?}");
+        }
+        assert_eq!([label(0.5, 0.5), label(20.0, 5.0), label(-0.0, 0.1)], ["0.5", "20", "0.0"]);
+    }
+
+    #[test]
+    fn a_frame_maps_its_range_and_tells_it_to_the_script() {
+        let mut out = String::new();
+        let at = frame(&mut out, (0.0, 10.0), (-1.0, 1.0), "time, s", "force <N>");
+        close(&mut out, "time, s");
+        assert_eq!((at(0.0, 1.0), at(10.0, -1.0)), ((LEFT, EDGE), (WIDE - EDGE, HIGH - EDGE)));
+        assert_eq!((at(5.0, 1e9).1, at(5.0, -1e9).1), (0.0, HIGH), "a place is in the frame");
+        assert!(out.contains("data-x=\"0e0 1e1\" data-y=\"-1e0 1e0\"") && out.contains("force &lt;N&gt;"));
+    }
+}
