@@ -15,6 +15,7 @@ pub mod needle;
 pub mod pc;
 pub mod rig;
 pub mod scenario;
+pub mod start;
 pub mod usb_host;
 
 /// The variable of the environment by which `cargo xtask bench` asks a test to measure for longer

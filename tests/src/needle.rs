@@ -30,38 +30,45 @@ pub struct State {
     pub reversed: bool,
 }
 
-/// The needle, shared between the test and the emulator's thread.
+/// The needle, shared between the test and the emulator's thread, and the instant to which it has
+/// moved.
 #[derive(Debug, Clone)]
-pub struct Needle(Arc<Mutex<State>>);
+pub struct Needle(Arc<Mutex<(State, Nanos)>>);
 
 impl Needle {
     /// At rest, held at `depth` in m.
     #[must_use]
     pub fn held_at(depth: f64) -> Self {
         let state = State { depth, speed: 0.0, hand: Some(depth), hand_speed: 0.0, reversed: false };
-        Self(Arc::new(Mutex::new(state)))
+        Self(Arc::new(Mutex::new((state, 0))))
+    }
+
+    /// Another needle that is where this one is.
+    #[must_use]
+    pub fn apart(&self) -> Self {
+        Self(Arc::new(Mutex::new(*self.0.lock().unwrap_or_else(PoisonError::into_inner))))
     }
 
     /// Returns its state.
     #[must_use]
     pub fn state(&self) -> State {
-        *self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).0
     }
 
     /// Changes it.
     pub fn change(&self, change: impl FnOnce(&mut State)) {
-        change(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner));
+        change(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner).0);
     }
 
-    /// As a plant, from `since` on.
+    /// As a plant, which goes on from where it is.
     #[must_use]
-    pub fn plant(&self, since: Nanos) -> impl PlantSide + use<> {
+    pub fn plant(&self) -> impl PlantSide + use<> {
         let shared = self.0.clone();
-        let mut last = since;
         move |at: Nanos, drive: Drive| {
-            let mut state = shared.lock().unwrap_or_else(PoisonError::into_inner);
-            let dt = at.saturating_sub(last) as f64 / 1e9;
-            last = at;
+            let mut shared = shared.lock().unwrap_or_else(PoisonError::into_inner);
+            let (state, last) = &mut *shared;
+            let dt = at.saturating_sub(*last) as f64 / 1e9;
+            *last = at;
             state.step(dt, drive);
             (state.depth * COUNTS_PER_M).floor() as i64
         }
@@ -99,7 +106,7 @@ mod tests {
         for (reversed, sign) in [(false, -1.0), (true, 1.0)] {
             let needle = Needle::held_at(0.0025);
             needle.change(|state| (state.hand, state.reversed) = (None, reversed));
-            let mut plant = needle.plant(0);
+            let mut plant = needle.plant();
             // 1 N outwards.
             let drive = Drive { code: Some(2_048 - 711), enabled: true };
             (0..=500).for_each(|step| {
@@ -114,7 +121,7 @@ mod tests {
     #[test]
     fn a_hand_holds_it() {
         let needle = Needle::held_at(0.0);
-        let mut plant = needle.plant(0);
+        let mut plant = needle.plant();
         needle.change(|state| state.hand_speed = 0.02);
         let drive = Drive { code: Some(2_048), enabled: true };
         (0..=50_000).for_each(|step| {

@@ -29,7 +29,7 @@ const ANSWER_MS: u64 = 200;
 const HELLOS: u64 = 2;
 
 /// The messages of the device.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub struct Heard {
     /// The latest hello.
     pub hello: Option<Hello>,
@@ -50,7 +50,7 @@ pub struct Heard {
 }
 
 /// The PC.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub struct Pc {
     reception: Reception,
     commands: Commands,

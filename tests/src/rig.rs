@@ -5,9 +5,10 @@ use link::Command;
 use link::frames::EventKind;
 
 use crate::board::processor::FIRST_EXTERNAL;
-use crate::board::{Board, Drive, Effect, MILLISECOND, Nanos, Upset, Wiring, plant};
+use crate::board::{Board, Drive, Effect, MILLISECOND, Nanos, PlantSide, Wiring, plant};
 use crate::pc::Pc;
 use crate::scenario::{COUNTS_PER_MM, board_wired};
+use crate::start::Start;
 use crate::usb_host::Port;
 
 /// Zero torque of the 12-bit converter.
@@ -40,12 +41,50 @@ pub struct Rig {
     pub pc: Pc,
 }
 
+/// The hand that presses it in.
+fn pressing() -> impl PlantSide {
+    plant::by_hand(plant::path(vec![(400 * MILLISECOND, 0), (700 * MILLISECOND, PRESSED)]))
+}
+
 /// True if the motor cannot move: the amplifier off and no torque requested.
 fn is_safe(drive: Drive) -> bool {
     !drive.enabled && drive.code.is_none_or(|code| code == ZERO_TORQUE)
 }
 
 impl Rig {
+    /// A board wired as `wiring` and a PC that has said hello, with `plant` on the shaft from then
+    /// on. Until then it was held still.
+    ///
+    /// # Panics
+    ///
+    /// When the PC finds no device.
+    #[must_use]
+    pub fn connected(wiring: Wiring, plant: impl PlantSide + 'static) -> Self {
+        let begin = |wiring| {
+            let (mut board, mut pc) = (board_wired(wiring, plant::held()), Pc::new());
+            pc.connect(&mut board);
+            (board, pc, ())
+        };
+        let (board, pc) = Start::of("connected", wiring, begin).on(plant);
+        Self { board, pc }
+    }
+
+    /// The same, held still, on the skin: it knows its depth.
+    ///
+    /// # Panics
+    ///
+    /// When the device refuses.
+    #[must_use]
+    pub fn zeroed(wiring: Wiring) -> Self {
+        let begin = |wiring| {
+            let Self { mut board, mut pc } = Self::connected(wiring, plant::held());
+            pc.must(&mut board, Command::Zero);
+            (board, pc, ())
+        };
+        let (board, pc) = Start::of("zeroed", wiring, begin).on(plant::held());
+        Self { board, pc }
+    }
+
     /// A needle pressed into skin, started by a person, with torque on it.
     ///
     /// # Panics
@@ -63,9 +102,22 @@ impl Rig {
     /// When there is no torque.
     #[must_use]
     pub fn pressed_on(wiring: Wiring) -> Self {
-        let hand = plant::path(vec![(400 * MILLISECOND, 0), (700 * MILLISECOND, PRESSED)]);
-        let hand = plant::by_hand(hand);
-        let mut rig = Self { board: board_wired(wiring, hand), pc: Pc::new() };
+        let begin = |wiring| {
+            let Self { board, pc } = Self::pressed_afresh(wiring);
+            (board, pc, ())
+        };
+        let (board, pc) = Start::of("pressed", wiring, begin).on(pressing());
+        Self { board, pc }
+    }
+
+    /// The same on a board that is switched on for it.
+    ///
+    /// # Panics
+    ///
+    /// When there is no torque.
+    #[must_use]
+    pub fn pressed_afresh(wiring: Wiring) -> Self {
+        let mut rig = Self { board: board_wired(wiring, pressing()), pc: Pc::new() };
         rig.pc.connect(&mut rig.board);
         rig.pc.must(&mut rig.board, Command::Start);
         rig.run_to(900);
@@ -88,14 +140,12 @@ impl Rig {
     pub fn time_to_safe(&mut self, limit: Nanos) -> Nanos {
         let start = self.board.now();
         while self.board.now() < start + limit {
-            self.board.run_until(self.board.now() + 10_000);
-            if self.board.at_stop(|stopped| is_safe(stopped.drive())) {
+            let end = (self.board.now() + MILLISECOND).min(start + limit);
+            if self.board.run_until_seen(end, 10_000, |stopped| is_safe(stopped.drive())) {
                 return self.board.now() - start;
             }
-            if (self.board.now() - start).is_multiple_of(MILLISECOND) {
-                // The PC goes on meanwhile.
-                self.pc.attend(&mut self.board);
-            }
+            // The PC goes on meanwhile.
+            self.pc.attend(&mut self.board);
         }
         let drive = self.board.at_stop(|stopped| stopped.drive());
         panic!("{drive:?} after {} us", limit / 1_000);
@@ -103,7 +153,7 @@ impl Rig {
 
     /// Something goes wrong in the exception of a task.
     pub fn upset(&mut self, exception: u32, effect: Effect) {
-        self.board.probe().tally().upset = Some(Upset { exception, after: 5, effect });
+        self.board.upset(exception, 5, effect);
     }
 
     /// A jump that hangs whoever makes it: to an endless loop in memory that the part has and the

@@ -133,7 +133,7 @@ fn rivals(folder: &Path, report: &Report) -> Result<Vec<Rival>, String> {
         Ok(Rival { name, words, probability: contender.probability, rig })
     };
     let mut rivals = report.contenders.iter().map(one).collect::<Result<Vec<_>, String>>()?;
-    // However unlikely, a name that the report gives as well is still to be told apart.
+    // However unlikely, a name that the report gives as well is still to be distinguished.
     let is_said = |rival: &&mut Rival| report.effects.iter().any(|effect| is_other(effect, &rival.name));
     for rival in rivals.iter_mut().filter(is_said) {
         rival.probability = rival.probability.max(LEAST_OF_CLASS);

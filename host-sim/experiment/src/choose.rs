@@ -140,9 +140,7 @@ impl Bench<'_> {
         let value = |sums: &Sums| criterion(&self.case.rivals, &sums.nats());
         let (mut parts, mut sums) = (vec![first], all[first].1.clone());
         let (mut now, mut seconds) = (value(&sums), all[first].0.seconds);
-        let travelling = all.iter().filter(|(segment, _)| segment.signal.travels());
-        let shortest_travel_s =
-            travelling.map(|(segment, _)| segment.seconds).fold(f64::INFINITY, f64::min).min(most_s);
+        let shortest_travel_s = shortest_travel_s(all);
         while parts.len() < MOST_SEGMENTS {
             let with = |(k, (segment, own)): (usize, &(Segment, Sums))| {
                 let travels = segment.signal.travels() || parts.iter().any(|k| all[*k].0.signal.travels());
@@ -194,6 +192,12 @@ impl Bench<'_> {
     }
 }
 
+/// The length of the shortest segment that travels, s; infinite if there is none.
+fn shortest_travel_s(all: &[(Segment, Sums)]) -> f64 {
+    let travelling = all.iter().filter(|(segment, _)| segment.signal.travels());
+    travelling.map(|(segment, _)| segment.seconds).fold(f64::INFINITY, f64::min)
+}
+
 /// The best of some, the shortest of those that are nearly as good.
 fn best(all: impl Iterator<Item = (usize, f64, f64)>) -> Option<(usize, f64, f64)> {
     let all: Vec<_> = all.collect();
@@ -230,18 +234,23 @@ pub fn design(case: &Case, most_s: f64, seed: u64) -> Result<Design, String> {
     }
     let mut firsts: Vec<(usize, f64)> =
         all.iter().enumerate().map(|(k, (_, sums))| (k, criterion(&case.rivals, &sums.nats()))).collect();
+    // What does not travel itself leaves time for what does.
+    let travels = |k: usize| all[k].0.signal.travels();
+    let shortest_s = shortest_travel_s(&all);
+    firsts.retain(|(k, _)| travels(*k) || all[*k].0.seconds + shortest_s <= most_s);
     firsts.sort_by(|a, b| b.1.total_cmp(&a.1).then(all[a.0].0.seconds.total_cmp(&all[b.0].0.seconds)));
     let grown = |(first, _): &(usize, f64)| {
         let mut parts = bench.grown(*first, &all, most_s);
         // Segments begin where the one before ended, so that together they may travel further than
         // each alone.
-        loop {
+        while parts.iter().any(|k| travels(*k)) {
             let segments = parts.iter().map(|k| all[*k].0.clone()).collect();
             if let Some(whole) = bench.whole(Input { segments }) {
                 return Some(whole);
             }
-            parts.pop().filter(|_| !parts.is_empty())?;
+            parts.pop();
         }
+        None
     };
     let mut whole: Vec<(Alternative, Vec<Prediction>)> =
         firsts.par_iter().take(RUNNERS_UP + 1).filter_map(grown).collect();

@@ -34,6 +34,18 @@ fn delay_or_lag() -> Case {
     case(vec![rival("command_delay", 0.5, vec![delay]), rival("electrical_lag", 0.5, vec![lag])])
 }
 
+/// Sines alone distinguish these rivals best, and a diagnosis refuses a recording of an axis at
+/// rest.
+#[test]
+fn an_input_travels_however_short_it_has_to_be() {
+    for most_s in [6.0, 7.0, 9.0] {
+        let design = design(&delay_or_lag(), most_s, 1).expect("the limits are wide");
+        let input = &design.chosen.input;
+        assert!(input.segments.iter().any(|segment| segment.signal.travels()), "{:?}", input.segments);
+        assert!(input.seconds() <= most_s, "{} s of {most_s}", input.seconds());
+    }
+}
+
 #[test]
 fn fast_forces_tell_a_delay_from_a_lag() {
     let design = design(&delay_or_lag(), 12.0, 1).expect("the limits are wide");

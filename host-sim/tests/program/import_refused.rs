@@ -100,11 +100,24 @@ const UNREAD_HDF5: &str = "is no usable HDF5 file";
 const UNREAD_HDF5: &str = "save('FILE.mat', '-v7')";
 
 #[test]
+fn columns_of_one_name_are_told_apart_by_their_numbers() {
+    let out = &folder("import-repeated");
+    let path = written(out, "repeated.csv", table("log.t,value,value").as_bytes());
+    let sentence = "has several columns \"value\"; say which by its number, as in --column position=2; its columns are log.t, value (column 2), value (column 3)";
+    assert_refused(out, vec![(path.clone(), &["--undriven", "--column", "position=value:rad"], sentence)]);
+    let result = out.join("result");
+    let numbered =
+        ["import", text(&path), "--column", "position=2:rad", "--undriven", "--out", text(&result)];
+    assert!(host_sim(&numbered).status().expect("it runs").success());
+}
+
+#[test]
 fn a_file_that_holds_no_usable_table_is_refused() {
     let out = &folder("import-unusable");
     let cases: Vec<Refused> = vec![
         (written(out, "g.mat", b"MATLAB 5.0 MAT-file, Platform: GLNXA64"), &[], "is no usable MATLAB file"),
         (written(out, "v73.mat", b"MATLAB 7.3 MAT-file"), &[], UNREAD_HDF5),
+        (written(out, "v4.mat", b"\0\0\0\0\x01\0\0\0"), &[], "is a MATLAB 4 file; save it again"),
         (foreign("sheet.xlsx"), &[], "is an Excel workbook; save its sheet as CSV"),
         (
             written(out, "both.csv", table("t,theta,foo").as_bytes()),

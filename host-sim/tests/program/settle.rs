@@ -52,6 +52,48 @@ fn what_was_settled_is_fed_forward_and_the_hand_feels_less() {
     }
 }
 
+/// A lag of 0.2 ms, which the first round does not tell from a delay.
+const LATE: &str = r#"format = 1
+kind = "rotary"
+model = { inertia = 1.4e-6, viscous = 1.2e-6, coulomb = 4.0e-4 }
+actuator = { gain = 1.4069371300321356e-5, command_unit = "dac", limit = 2047.0 }
+encoder = { counts_per_unit = 636.6197772990716, turn = 6.283185307179586 }
+[[effect]]
+name = "electrical_lag"
+shape = { time_constant = 0.0002 }
+"#;
+
+/// 38 s of motion at 10 kHz and two diagnoses take some 15 s: fewer would not show a round that is
+/// designed against the one before.
+#[test]
+fn a_class_is_asked_again_within_the_motion_allowed() {
+    let out = folder("settle-designed");
+    let rig = Rig::parse(LATE, "lag.toml").expect("a rig");
+    let mut subject = Subject::Virtual(Box::new(Plant { rig, file: "lag.toml".into() }));
+    let rig = subject.data_sheet_rig().expect("the virtual device has a data sheet");
+    let settings = Settings { rounds: 5, motion_s: 38.0, compensate: false, ..settings(&out, 0.0, true) };
+    let mut asked = Vec::new();
+    let settled = settle(&mut subject, &rig, &settings, |progress| {
+        if let Progress::Asked(_, words, _) = progress {
+            asked.push(words.to_owned());
+        }
+        Ok(())
+    })
+    .expect("it is settled");
+    let class = ["command_delay", "electrical_lag"];
+    assert!(
+        settled.rounds[0].names.iter().any(|name| name.class.iter().all(|one| class.contains(&one.as_str())))
+    );
+    assert_eq!((asked.len(), settled.rounds.len()), (2, 2), "{}", settled.conclusion);
+    assert!(settled.motion_s() <= 38.0, "{} s", settled.motion_s());
+    // The second was designed, and predicts what each rival would do.
+    let design =
+        std::fs::read_to_string(out.join("round-2/experiment/experiment.json")).expect("it was designed");
+    let design: serde_json::Value = serde_json::from_str(&design).expect("JSON");
+    assert!(class.iter().all(|name| design.to_string().contains(name)), "{design}");
+    assert!(settled.conclusion.contains("38 s are allowed"), "{}", settled.conclusion);
+}
+
 /// A device with a mechanism behind a port. It moves on only while its wire is read, and no faster
 /// than a clock.
 struct Behind(Arc<Mutex<BareDevice>>);

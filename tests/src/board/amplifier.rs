@@ -1,9 +1,11 @@
 //! The servo amplifier at the board's pins, and what goes wrong with it.
 
+use serde::{Deserialize, Serialize};
+
 use super::plant::Drive;
 
 /// The amplifier's fault.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Amplifier {
     /// Nothing.
     #[default]

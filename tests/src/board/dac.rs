@@ -10,8 +10,8 @@
 
 use rigless::chip::parallel::Peer;
 use rigless::device::DeviceContext;
-use rigless::snapshot::Store;
 use rigless::soc::Width;
+use serde::{Deserialize, Serialize};
 
 const CR: u64 = 0x00;
 const SWTRIGR: u64 = 0x04;
@@ -42,7 +42,7 @@ fn selected(control: u32) -> u32 {
 }
 
 /// The converter.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, Serialize, Deserialize)]
 pub(super) struct Dac {
     control: u32,
     held: u16,
@@ -104,7 +104,7 @@ impl Dac {
     }
 }
 
-impl Store for Dac {}
+rigless::store!(Dac);
 
 impl Peer for Dac {
     fn read(&mut self, offset: u64, _width: Width, _context: &mut DeviceContext<'_>) -> u64 {

@@ -62,6 +62,15 @@ fn code(bytes: &[u8], address: u32) -> Option<&[u8]> {
     bytes.get((offset + address - begin) as usize..(offset + size) as usize)
 }
 
+/// Returns the first instruction of the handler of `exception`, by the vector table at the foot of
+/// the flash.
+#[must_use]
+pub fn handler(bytes: &[u8], exception: u32) -> Option<u32> {
+    const VECTORS: u32 = 0x0800_0000;
+    // Bit 0 says that it is Thumb code.
+    Some(word(code(bytes, VECTORS)?, 4 * exception as usize)? & !1)
+}
+
 /// The instructions by which the function at `address` may return, its own and those of functions
 /// that it jumps to as its last act; none where there is no such function. ARMv7-M manual, A7.7:
 /// `bx lr`, `pop {…, pc}`, `ldr pc, [sp], #4`, `b`.

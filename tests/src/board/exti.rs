@@ -3,8 +3,8 @@
 
 use rigless::chip::parallel::Peer;
 use rigless::device::{DeviceContext, Level};
-use rigless::snapshot::Store;
 use rigless::soc::Width;
+use serde::{Deserialize, Serialize};
 
 const IMR: u64 = 0x00;
 const RTSR: u64 = 0x08;
@@ -18,7 +18,7 @@ const DETECTOR: u32 = 1 << 16;
 pub(super) const INTERRUPTS: [u16; 1] = [1];
 
 /// The controller.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, Serialize, Deserialize)]
 pub(super) struct Exti {
     mask: u32,
     rising: u32,
@@ -46,7 +46,7 @@ impl Exti {
     }
 }
 
-impl Store for Exti {}
+rigless::store!(Exti);
 
 impl Peer for Exti {
     fn read(&mut self, offset: u64, _width: Width, _context: &mut DeviceContext<'_>) -> u64 {

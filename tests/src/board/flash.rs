@@ -11,6 +11,9 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+use rigless::snapshot::{Error, Reader, Store, Writer};
+use serde::{Deserialize, Serialize};
+
 /// The flash interface's control register, its bits, and its key register.
 const FLASH_CR: u64 = 0x4002_3C10;
 const FLASH_KEYR: u64 = 0x4002_3C04;
@@ -57,7 +60,7 @@ pub(super) const WRITABLE: std::ops::Range<u64> = 0x0808_0000..0x0810_0000;
 const ERASED: u32 = u32::MAX;
 
 /// The array's state.
-#[derive(Debug)]
+#[derive(Debug, Serialize, Deserialize)]
 pub struct Array {
     /// Every word that is not erased, by address.
     words: BTreeMap<u64, u32>,
@@ -249,6 +252,17 @@ impl Array {
 /// Shared between the test and the core.
 #[derive(Debug, Clone, Default)]
 pub struct Flash(Arc<Mutex<Array>>);
+
+impl Store for Flash {
+    fn store(&self, to: &mut Writer) -> Result<(), Error> {
+        to.put(&*self.array())
+    }
+
+    fn load(&mut self, from: &mut Reader) -> Result<(), Error> {
+        *self.array() = from.take()?;
+        Ok(())
+    }
+}
 
 impl Flash {
     /// The array, to look at or to change.

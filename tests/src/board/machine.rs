@@ -11,7 +11,6 @@ use rigless::device::Level;
 use rigless::emulator::Processor;
 use rigless::machine::{Board, Target, armv7m};
 use rigless::mcu::{Mcu, Operate, Wired};
-use rigless::snapshot::Store;
 use rigless::soc::stm32f427::Stm32f427;
 use rigless::soc::stm32f427::peripherals::adc;
 use rigless::soc::stm32f427::peripherals::gpio::Pin;
@@ -124,7 +123,7 @@ pub(super) fn pin(index: u8) -> Pin {
     Pin::new(index).expect("a port has sixteen pins")
 }
 
-impl Store for Machine {}
+rigless::store!(Machine { values: [], parts: [mcu, flash], built: [image, probe, pins] });
 
 impl Board for Machine {
     fn name(&self) -> &'static str {

@@ -6,6 +6,7 @@
 //! instruction counts, not cycles. The same image, plant and orders give the same run.
 
 mod amplifier;
+mod asked;
 mod bus;
 pub mod cache;
 mod dac;
@@ -22,11 +23,13 @@ pub mod processor;
 mod record;
 mod rtt;
 mod run;
+mod snapshot;
 mod stopped;
 pub mod tilt;
 mod tracks;
 mod usb_port;
 mod warm_core;
+mod watch;
 pub mod wires;
 mod world;
 
@@ -43,7 +46,8 @@ use rigless::time::VirtualNanos;
 pub use amplifier::Amplifier;
 pub use bus::INSTRUCTIONS_PER_SECOND;
 pub use plant::{Drive, Nanos, PlantSide};
-pub use probe::{Counted, Effect, HandlerRun, Probe, ToCode, Upset};
+pub use probe::{Counted, Effect, HandlerRun, Probe, ToCode};
+pub use snapshot::Saved;
 pub use stopped::Stopped;
 pub use usb_port::UsbPort;
 pub use world::{EncoderRead, Log, Output};
@@ -196,6 +200,7 @@ pub struct Board {
     probe: Probe,
     flash: flash::Flash,
     image: PathBuf,
+    wiring: Wiring,
     symbols: Vec<elf::Symbol>,
     stack: Option<(u64, u64)>,
     now: Nanos,
@@ -205,6 +210,16 @@ impl Board {
     /// Switches on a board with the image at `path`, wired as `wiring`, with `plant` on its shaft.
     /// The core has run nothing yet.
     pub fn on(path: &Path, wiring: Wiring, plant: impl PlantSide + 'static) -> Result<Self, Refused> {
+        Self::start(path, wiring, Box::new(plant), None)
+    }
+
+    /// Switches on a board, or goes on from where `saved` stood.
+    fn start(
+        path: &Path,
+        wiring: Wiring,
+        plant: Box<dyn PlantSide>,
+        saved: Option<&Saved>,
+    ) -> Result<Self, Refused> {
         let refuse = |why: String| Refused(format!("{}: {why}", path.display()));
         let bytes = std::fs::read(path)
             .map_err(|error| refuse(format!("{error}; `cargo xtask firmware` builds the image")))?;
@@ -220,7 +235,7 @@ impl Board {
         }
         let machine = Machine::new(&wiring, key, probe.clone(), flash.clone())
             .map_err(|error| refuse(error.to_string()))?;
-        let session =
+        let mut session =
             Session::new(Box::new(machine), 0, VirtualNanos(0)).map_err(|error| refuse(error.to_string()))?;
         let find = |name: &str| places.get(name).ok();
         let stack = find("_stack_start").map(|top| {
@@ -232,14 +247,21 @@ impl Board {
         let known = world::Symbols { rtt: find("_SEGGER_RTT"), stack };
         let (orders, taken) = channel();
         let (answer, done) = channel();
-        let run = Run::new(World::new(wiring, known, Box::new(plant)), taken, answer);
+        let mut world = World::new(wiring, known, plant);
+        let resume = saved
+            .map(|saved| saved.snapshot.restore(&mut session, &key.digest(), &mut world))
+            .transpose()
+            .map_err(|error| refuse(error.to_string()))?;
+        let run = Run::new(world, key, resume.is_some(), (taken, answer));
         let thread = std::thread::spawn(move || {
             let images = [image];
-            let finished = emulator::run(session, &Start::new(&images), run);
+            let mut start = Start::new(&images);
+            start.resume = resume.as_ref();
+            let finished = emulator::run(session, &start, run);
             finished.map(drop).map_err(|error| error.to_string())
         });
-        let image = path.to_path_buf();
-        Ok(Self { orders, done, thread: Some(thread), probe, flash, image, symbols, stack, now: 0 })
+        let (image, now) = (path.to_path_buf(), saved.map_or(0, |saved| saved.now));
+        Ok(Self { orders, done, thread: Some(thread), probe, flash, image, wiring, symbols, stack, now })
     }
 
     fn order(&mut self, order: Order) {
@@ -269,27 +291,6 @@ impl Board {
         self.run_until(self.now + milliseconds * MILLISECOND);
     }
 
-    /// Runs until `wanted` holds, looking every `every_us` microseconds, for `limit_ms`
-    /// milliseconds at most. Answers whether it came to hold.
-    pub fn run_while_not(
-        &mut self,
-        limit_ms: u64,
-        every_us: u64,
-        wanted: impl FnMut(&mut Stopped<'_>) -> bool + Send + Clone + 'static,
-    ) -> bool {
-        let end = self.now + limit_ms * MILLISECOND;
-        loop {
-            let mut look = wanted.clone();
-            if self.at_stop(move |stopped| look(stopped)) {
-                return true;
-            }
-            if self.now >= end {
-                return false;
-            }
-            self.run_until((self.now + every_us * 1_000).min(end));
-        }
-    }
-
     /// Visits the stopped board.
     pub fn at_stop<T: Send + 'static>(
         &mut self,
@@ -306,38 +307,6 @@ impl Board {
     #[must_use]
     pub fn probe(&self) -> Probe {
         self.probe.clone()
-    }
-
-    /// Counts the instructions of each run of the interrupt handler called `name` from now on.
-    ///
-    /// # Panics
-    ///
-    /// When the image has no such handler.
-    pub fn count_runs_of(&self, name: &str) {
-        let bytes = std::fs::read(&self.image).expect("the image that runs");
-        let handler = self.symbols.iter().find(|symbol| symbol.name == name);
-        let entry = handler.unwrap_or_else(|| panic!("the image has no handler {name}")).address;
-        let exits = elf::exits(&bytes, &self.symbols, entry);
-        self.probe.tally().counted = Some(Counted { entry, exits });
-    }
-
-    /// The same, and counts the lines of its code that come from the flash, which takes an
-    /// instruction at a time.
-    ///
-    /// # Panics
-    ///
-    /// When the image has no such handler.
-    pub fn count_lines_of(&self, name: &str) {
-        self.count_runs_of(name);
-        self.probe.tally().count_lines = true;
-    }
-
-    /// Stops counting and returns the runs that have ended.
-    #[must_use]
-    pub fn counted_runs(&self) -> Vec<HandlerRun> {
-        let mut tally = self.probe.tally();
-        (tally.counted, tally.count_lines) = (None, false);
-        std::mem::take(&mut tally.runs)
     }
 
     /// The sectors of flash that the firmware writes to.

@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use serde::{Deserialize, Serialize};
+
 /// Virtual time since the board was switched on, in nanoseconds.
 pub type Nanos = u64;
 
@@ -85,7 +87,7 @@ pub fn by_hand(mut plant: impl PlantSide) -> impl PlantSide {
 }
 
 /// The two tracks of an incremental encoder.
-#[derive(Debug)]
+#[derive(Debug, Serialize, Deserialize)]
 pub(super) struct Encoder {
     /// The angle whose levels are on the wires, in counts.
     angle: i64,

@@ -29,8 +29,10 @@ pub struct ToCode {
 /// Something that goes wrong inside the core, and when.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Upset {
-    /// The exception that has to be running; 0 is thread mode.
+    /// The exception that has to be running.
     pub exception: u32,
+    /// The first instruction of its handler.
+    pub entry: u32,
     /// The number of its instructions before the effect.
     pub after: u32,
     /// The effect.
@@ -81,6 +83,15 @@ pub struct Tally {
     pub upset: Option<Upset>,
     /// Instructions done in the exception the upset waits for.
     pub(super) upset_progress: u32,
+}
+
+impl Tally {
+    /// True if a test has asked for nothing, so that nothing is lost where another board goes on.
+    pub(super) fn is_idle(&self) -> bool {
+        let counts = self.counted.is_some() || self.count_lines || !self.masks.is_empty();
+        let meddles = self.shorted.is_some() || self.identity.is_some() || self.upset.is_some();
+        !counts && !meddles
+    }
 }
 
 /// Shared between the test and the core.

@@ -75,7 +75,8 @@ impl Probed {
         let wanted: BTreeSet<u32> = {
             let tally = self.probe.tally();
             let counted = tally.counted.iter().flat_map(|it| it.exits.iter().copied().chain([it.entry]));
-            counted.chain(tally.masks.keys().copied()).collect()
+            let upset = tally.upset.map(|upset| upset.entry);
+            counted.chain(tally.masks.keys().copied()).chain(upset).collect()
         };
         if wanted == self.breakpoints {
             return;
@@ -87,12 +88,12 @@ impl Probed {
         self.breakpoints = wanted.into_iter().filter(|&new| self.core.add_breakpoint(new.into())).collect();
     }
 
-    /// Runs like the core from breakpoint to breakpoint, and an instruction at a time while an
-    /// upset is to come.
+    /// Runs like the core from breakpoint to breakpoint, and an instruction at a time where an
+    /// upset is near.
     fn run_watched(&mut self, budget: u32, bus: &mut Rerouted<'_>) -> (Exit, u64) {
         let mut retired = 0;
         while retired < u64::from(budget) {
-            bus.stepping = self.probe.tally().upset.is_some() || self.is_counting_lines();
+            bus.stepping = self.is_near_upset() || self.is_counting_lines();
             self.note_fetch();
             let left = if bus.stepping { 1 } else { budget - retired as u32 };
             let (mut exit, mut did) = self.core.run(left, bus);
@@ -127,6 +128,15 @@ impl Probed {
             }
         }
         (Exit::Budget, retired)
+    }
+
+    /// Returns true in the exception that an upset waits for, and from there on until it comes.
+    fn is_near_upset(&self) -> bool {
+        let waiting = {
+            let tally = self.probe.tally();
+            tally.upset.map(|upset| (upset.exception, tally.upset_progress > 0))
+        };
+        waiting.is_some_and(|(exception, has_begun)| has_begun || exception == self.exception())
     }
 
     /// Returns true while the lines of a handler's code are counted.
@@ -247,7 +257,7 @@ impl Processor for Probed {
             asked: Vec::new(),
         };
         self.settle_breakpoints();
-        let watched = !self.breakpoints.is_empty() || self.probe.tally().upset.is_some();
+        let watched = !self.breakpoints.is_empty();
         let (exit, retired) =
             if watched { self.run_watched(budget, &mut bus) } else { self.core.run(budget, &mut bus) };
         // What kept the core from its instructions is time that has passed.
@@ -341,11 +351,20 @@ impl Processor for Probed {
         self.core.byte_order(address)
     }
 
+    /// The time that passed without instructions, the lines that are high, and the core's own
+    /// state.
     fn save(&self) -> Vec<u8> {
-        self.core.save()
+        let mut bytes = self.stalled.to_le_bytes().to_vec();
+        bytes.extend(self.core.save_lines());
+        bytes.extend(self.core.save());
+        bytes
     }
 
     fn load(&mut self, bytes: &[u8]) -> Result<(), Error> {
-        self.core.load(bytes)
+        let (stalled, rest) = bytes.split_first_chunk().ok_or(Error::State)?;
+        let rest = self.core.load_lines(rest).ok_or(Error::State)?;
+        self.core.load(rest)?;
+        (self.stalled, self.counting) = (u64::from_le_bytes(*stalled), None);
+        Ok(())
     }
 }

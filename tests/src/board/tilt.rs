@@ -2,7 +2,7 @@
 //! wrong with them.
 
 use rigless::chip::{Timeline, spi::Peer};
-use rigless::snapshot::Store;
+use serde::{Deserialize, Serialize};
 
 const WHO_AM_I: u8 = 0x0F;
 /// LIS302DL `CTRL_REG1`, LIS3DSH `CTRL_REG4`, and what either holds out of its reset: power-down.
@@ -18,7 +18,7 @@ const OUT_LAST: u8 = 0x2D;
 const MEASURE_EVERY: u64 = 10_000_000;
 
 /// The model of the accelerometer.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Model {
     /// LIS302DL: 8 bits, 18 mg a digit.
     Lis302dl,
@@ -27,7 +27,7 @@ pub enum Model {
 }
 
 /// The sensor's fault.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Health {
     /// Nothing.
     Good,
@@ -42,12 +42,12 @@ pub enum Health {
 }
 
 /// One accelerometer.
-#[derive(Debug)]
+#[derive(Debug, Serialize, Deserialize)]
 pub struct Accelerometer {
     model: Model,
     /// Its fault, if any.
     pub health: Health,
-    registers: [u8; 128],
+    registers: Vec<u8>,
     /// The address the next byte goes to or comes from, once the first byte has come.
     address: Option<u8>,
     reading: bool,
@@ -61,8 +61,8 @@ pub struct Accelerometer {
 
 impl Accelerometer {
     /// The registers of a chip that has just been given power.
-    fn reset(model: Model) -> [u8; 128] {
-        let mut registers = [0; 128];
+    fn reset(model: Model) -> Vec<u8> {
+        let mut registers = vec![0; 128];
         registers[usize::from(WHO_AM_I)] = match model {
             Model::Lis302dl => 0x3B,
             Model::Lis3dsh => 0x3F,
@@ -193,7 +193,7 @@ impl Accelerometer {
     }
 }
 
-impl Store for Accelerometer {}
+rigless::store!(Accelerometer);
 
 impl Peer for Accelerometer {
     fn transfer(&mut self, mosi: u32, bits: u8, _context: &mut Timeline<'_, '_>) -> u32 {

@@ -36,6 +36,12 @@ pub(super) struct Tracks {
     heard: [bool; 2],
 }
 
+rigless::store!(Tracks {
+    values: [encoder, wires, glitch_ends, floating, floating_until, settled, heard],
+    parts: [],
+    built: [timer, pins],
+});
+
 impl Tracks {
     pub(super) fn new(wiring: &Wiring) -> Self {
         Self {

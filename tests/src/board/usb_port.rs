@@ -2,9 +2,9 @@
 
 use rigless::chip::parallel::Peer;
 use rigless::device::{DeviceContext, Level};
-use rigless::snapshot::Store;
 use rigless::soc::Width;
 use rigless::time::{EventId, VirtualNanos};
+use serde::{Deserialize, Serialize};
 
 use super::otg::Core;
 use crate::usb_host::Host;
@@ -13,7 +13,7 @@ use crate::usb_host::Host;
 pub(super) const INTERRUPTS: [u16; 1] = [67];
 
 /// Core and host.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, Serialize, Deserialize)]
 pub struct UsbPort {
     /// The device side, which the firmware programs.
     pub core: Core,
@@ -33,7 +33,7 @@ impl UsbPort {
     }
 }
 
-impl Store for UsbPort {}
+rigless::store!(UsbPort);
 
 impl Peer for UsbPort {
     fn read(&mut self, offset: u64, _width: Width, context: &mut DeviceContext<'_>) -> u64 {

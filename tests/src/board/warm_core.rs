@@ -29,6 +29,13 @@ impl ImageKey {
         hash.write(bytes);
         Self(hash.finish())
     }
+
+    /// The same where the emulator wants a longer hash.
+    pub(super) fn digest(self) -> [u8; 32] {
+        let mut digest = [0; 32];
+        digest[..8].copy_from_slice(&self.0.to_le_bytes());
+        digest
+    }
 }
 
 static IDLE: Mutex<BTreeMap<ImageKey, Vec<Core>>> = Mutex::new(BTreeMap::new());
@@ -140,6 +147,22 @@ impl WarmCore {
             Queued::Invalidate(..) | Queued::Unroute(_) | Queued::Return => {}
         }
         true
+    }
+
+    /// The interrupt lines that are high, as bytes: a board that starts from another's state has to
+    /// know them.
+    pub(super) fn save_lines(&self) -> Vec<u8> {
+        let indices = self.high.iter().map(|line| line.index());
+        std::iter::once(self.high.len() as u16).chain(indices).flat_map(u16::to_le_bytes).collect()
+    }
+
+    /// Takes what [`Self::save_lines`] made from the front of `bytes`, and returns the rest.
+    pub(super) fn load_lines<'a>(&mut self, bytes: &'a [u8]) -> Option<&'a [u8]> {
+        let (count, rest) = bytes.split_first_chunk()?;
+        let (lines, rest) = rest.split_at_checked(2 * usize::from(u16::from_le_bytes(*count)))?;
+        let indices = lines.chunks_exact(2).map(|index| u16::from_le_bytes([index[0], index[1]]));
+        self.high = indices.map(InterruptLine::new).collect::<Option<_>>()?;
+        Some(rest)
     }
 
     pub(super) fn add_breakpoint(&mut self, address: u64) -> bool {

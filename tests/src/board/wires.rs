@@ -1,7 +1,9 @@
 //! The encoder's wires, and what happens to them.
 
+use serde::{Deserialize, Serialize};
+
 /// One track's wire to the board.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Wire {
     /// It brings the track's level.
     #[default]
@@ -24,7 +26,7 @@ impl Wire {
 }
 
 /// Both of them.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Wires {
     /// To the pin of track A.
     pub a: Wire,

@@ -6,6 +6,7 @@ use rigless::session::Session;
 use rigless::soc::Width;
 use rigless::soc::stm32f427::peripherals::adc;
 use rigless::time::VirtualNanos;
+use serde::{Deserialize, Serialize};
 
 use super::amplifier::Amplifier;
 use super::bus::DAC;
@@ -16,7 +17,7 @@ use super::tracks::{PULL_SETTLES, Tracks};
 use super::{SetValue, Timer, Wiring, rtt};
 
 /// A code on its way to the motor.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Output {
     /// Its time.
     pub at: Nanos,
@@ -27,7 +28,7 @@ pub struct Output {
 }
 
 /// A read of the encoder's counter by the firmware.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct EncoderRead {
     /// Its time.
     pub at: Nanos,
@@ -36,7 +37,7 @@ pub struct EncoderRead {
 }
 
 /// The log of the pins.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Log {
     /// Every write of a code to DAC channel 1.
     pub written: Vec<Output>,
@@ -59,7 +60,7 @@ pub(super) struct Symbols {
 }
 
 /// The connection of a line of the drive.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) enum Contact {
     /// The board's supply: the contact is closed.
     Closed,
@@ -106,6 +107,26 @@ pub(super) struct World {
     painted: bool,
     pub(super) log: Log,
 }
+
+// A plant does not keep its state: one that has any would go on from nowhere.
+rigless::store!(World {
+    values: [
+        next_step,
+        next_drain,
+        target,
+        enabled,
+        code,
+        latch_at,
+        strap_settles,
+        amplifier,
+        contacts,
+        violations,
+        painted,
+        log,
+    ],
+    parts: [tracks],
+    built: [wiring, symbols, plant],
+});
 
 /// The period in which the RTT terminal is emptied.
 const DRAIN_EVERY: Nanos = 1_000_000;

@@ -1,5 +1,7 @@
 //! Control transfers on endpoint 0, USB 2.0 section 8.5.3, one transaction at a time.
 
+use serde::{Deserialize, Serialize};
+
 use super::wire::{Device, Handshake};
 
 /// The end of a control transfer.
@@ -18,7 +20,7 @@ pub(super) enum Ended {
     Dead,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 enum Stage {
     Setup,
     DataIn,
@@ -28,7 +30,7 @@ enum Stage {
 }
 
 /// One control transfer under way.
-#[derive(Debug)]
+#[derive(Debug, Serialize, Deserialize)]
 pub(super) struct Transfer {
     request: [u8; 8],
     stage: Stage,

@@ -1,11 +1,13 @@
 //! The information in a device's descriptors: USB 2.0 chapter 9 and CDC 1.2 section 5.
 
+use serde::{Deserialize, Serialize};
+
 /// The communications interface class, and the data interface class.
 const CLASS_COMMUNICATIONS: u8 = 0x02;
 const CLASS_DATA: u8 = 0x0A;
 
 /// The device's description of itself.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Identity {
     /// The vendor's number.
     pub vendor: u16,
@@ -16,7 +18,7 @@ pub struct Identity {
 }
 
 /// The endpoints of one CDC serial port.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct CdcPort {
     /// The number of the communications interface, which class requests name.
     pub interface: u8,

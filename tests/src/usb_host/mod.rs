@@ -12,6 +12,8 @@ pub mod wire;
 
 use std::collections::VecDeque;
 
+use serde::{Deserialize, Serialize};
+
 use control::{Ended, Transfer};
 use descriptors::{CdcPort, Identity, cdc_port, text};
 use wire::{Device, Handshake};
@@ -47,7 +49,7 @@ fn wire_time(bytes: usize) -> Nanos {
     (bytes as u64 + 16) * 8 * 1_000 / 12
 }
 
-#[derive(Debug)]
+#[derive(Debug, Serialize, Deserialize)]
 enum Phase {
     Absent,
     Debounce(Nanos),
@@ -61,7 +63,7 @@ enum Phase {
 }
 
 /// The host.
-#[derive(Debug)]
+#[derive(Debug, Serialize, Deserialize)]
 pub struct Host {
     cable: bool,
     sleep: bool,

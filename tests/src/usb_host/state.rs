@@ -1,5 +1,7 @@
 //! The port as a program on the PC sees it.
 
+use serde::{Deserialize, Serialize};
+
 /// The state of the port.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Port {
@@ -16,7 +18,7 @@ pub enum Port {
 }
 
 /// The counts of the host since it was made.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Counts {
     /// The number of times that the serial port appeared.
     pub enumerations: u32,

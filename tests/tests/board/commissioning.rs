@@ -22,8 +22,8 @@ use tests::board::wires::{Wire, Wires};
 use tests::board::{Board, Wiring, plant};
 use tests::needle::Needle;
 use tests::pc::{Pc, open_port};
-use tests::rig::ZERO_TORQUE;
-use tests::scenario::{board, board_wired};
+use tests::rig::{Rig, ZERO_TORQUE};
+use tests::scenario::board_wired;
 
 const NOT_COMMISSIONED: CommandRefusal = CommandRefusal::Interlocked(Interlock::NotCommissioned);
 
@@ -42,7 +42,7 @@ fn a_board_without_a_record_starts_only_once_it_is_commissioned() {
     let unknown = Wiring { commissioned: false, ..Wiring::default() };
     let needle = Needle::held_at(0.0);
     needle.change(|state| state.hand = None);
-    let mut board = board_wired(unknown, needle.plant(0));
+    let mut board = board_wired(unknown, needle.plant());
     let mut pc = Pc::new();
     pc.connect(&mut board);
     pc.must(&mut board, Command::Zero);
@@ -110,10 +110,7 @@ fn a_patient_does_not_commission_a_device() {
 
 #[test]
 fn a_zero_outlives_a_cable_that_is_pulled() {
-    let mut board = board(plant::held());
-    let mut pc = Pc::new();
-    pc.connect(&mut board);
-    pc.must(&mut board, Command::Zero);
+    let Rig { mut board, mut pc } = Rig::zeroed(Wiring::default());
     board.at_stop(|stopped| stopped.usb().host.unplug());
     board.run_ms(50);
     pc.connect(&mut board);
@@ -124,9 +121,7 @@ fn a_zero_outlives_a_cable_that_is_pulled() {
 /// lowered, not raised.
 #[test]
 fn no_command_raises_a_ceiling() {
-    let mut board = board(plant::held());
-    let mut pc = Pc::new();
-    pc.connect(&mut board);
+    let Rig { mut board, mut pc } = Rig::connected(Wiring::default(), plant::held());
     let with = |change: fn(&mut Device)| {
         let mut device = Device::commissioned_virtual();
         change(&mut device);
@@ -184,7 +179,7 @@ impl Bench {
         let needle = Needle::held_at(0.0);
         needle.change(|state| (state.hand, state.reversed) = (None, reversed));
         let unknown = Wiring { commissioned: false, ..Wiring::default() };
-        let mut board = board_wired(unknown, needle.plant(0));
+        let mut board = board_wired(unknown, needle.plant());
         board.at_stop(move |stopped| stopped.set_wires(wires));
         open_port(&mut board);
         Self { board, needle, end: None }
@@ -240,6 +235,8 @@ impl Line for Bench {
     }
 }
 
+/// Takes more than 5 s: a person's whole dialogue, 25 s of the board, with the leads either way
+/// round.
 #[test]
 fn a_device_is_commissioned_over_its_cable_and_keeps_its_record() {
     for reversed in [false, true] {

@@ -143,6 +143,8 @@ fn felt_on_board(found: Option<&Found>) -> Felt {
     felt(&rows)
 }
 
+/// Takes more than 5 s: an insertion at a hand's speed twice, and the slow turn that finds the
+/// rotor's angle, 25 s of the board.
 #[test]
 fn a_hand_feels_a_quarter_of_the_mechanism() {
     let found = what_was_found();

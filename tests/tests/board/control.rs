@@ -1,4 +1,6 @@
-//! The board computes what control-core computes, tick for tick and bit for bit.
+//! The board computes what control-core computes, tick for tick and bit for bit. Each test takes
+//! more than 5 s: a whole insertion and withdrawal at a speed for which the laws were made, ten
+//! seconds of the board.
 
 use control_core::event::State;
 use tests::follow::follows;

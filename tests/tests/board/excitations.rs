@@ -8,10 +8,9 @@ use fixed::types::{I8F24, I16F16};
 use link::Command;
 use link::codec::{self, MAX_FRAME};
 use link::frames::{CommandRefusal, HostFrame};
-use tests::board::{Board, MILLISECOND, Nanos, plant};
-use tests::pc::{self, Pc};
-use tests::rig::ZERO_TORQUE;
-use tests::scenario::board;
+use tests::board::{Board, MILLISECOND, Nanos, Wiring};
+use tests::pc;
+use tests::rig::{Rig, ZERO_TORQUE};
 
 fn mm(length: f64) -> Millimetres {
     Millimetres(I16F16::from_num(length))
@@ -48,10 +47,7 @@ fn switched(board: &mut Board, since: Nanos) -> Vec<(Nanos, bool)> {
 /// Every command that is refused here would move a roller if it were not.
 #[test]
 fn a_sequence_stays_in_bounds_and_ends_with_its_session() {
-    let mut board = board(plant::held());
-    let mut pc = Pc::new();
-    pc.connect(&mut board);
-    pc.must(&mut board, Command::Zero);
+    let Rig { mut board, mut pc } = Rig::zeroed(Wiring::default());
     let sound = strokes(50.0, 5_000);
     let too_strong = Signal::BreakawayRamps { torque: MillinewtonMetres(I16F16::from_num(29)), ramp_ms: 100 };
     let beyond = [
@@ -110,10 +106,7 @@ fn three_segments() -> Vec<Excitation> {
 
 #[test]
 fn a_sequence_is_uploaded_torque_off_and_plays_without_a_rest() {
-    let mut board = board(plant::held());
-    let mut pc = Pc::new();
-    pc.connect(&mut board);
-    pc.must(&mut board, Command::Zero);
+    let Rig { mut board, mut pc } = Rig::zeroed(Wiring::default());
     let segments = three_segments();
     let commands = pc::sequence(&segments);
     let (play, upload) = commands.split_last().expect("a command to play");
@@ -144,10 +137,7 @@ fn a_sequence_is_uploaded_torque_off_and_plays_without_a_rest() {
 
 #[test]
 fn a_sequence_stops_at_once_and_nothing_of_it_is_left() {
-    let mut board = board(plant::held());
-    let mut pc = Pc::new();
-    pc.connect(&mut board);
-    pc.must(&mut board, Command::Zero);
+    let Rig { mut board, mut pc } = Rig::zeroed(Wiring::default());
     let commands = pc::sequence(&three_segments());
     let play = commands.last().expect("a command to play");
     // In the second segment, as a person presses Stop.
@@ -184,10 +174,7 @@ fn a_sequence_stops_at_once_and_nothing_of_it_is_left() {
 
 #[test]
 fn a_damaged_or_unsound_sequence_gives_no_torque() {
-    let mut board = board(plant::held());
-    let mut pc = Pc::new();
-    pc.connect(&mut board);
-    pc.must(&mut board, Command::Zero);
+    let Rig { mut board, mut pc } = Rig::zeroed(Wiring::default());
     let segments = three_segments();
     let commands = pc::sequence(&segments);
     let play = commands.last().expect("a command to play");

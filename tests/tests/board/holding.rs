@@ -110,6 +110,8 @@ fn held_for(held: &mut Held, seconds: u64) -> (f64, f64) {
     force
 }
 
+/// Takes more than 5 s: 72 minutes of the core on this machine, for the check for a dead encoder
+/// may not tire.
 #[test]
 fn a_hand_that_holds_still_for_minutes_keeps_its_device() {
     for (name, patient) in patients() {
@@ -143,7 +145,7 @@ fn a_hand_that_holds_still_for_minutes_keeps_its_device() {
 /// still.
 fn held_on_the_board(patient: Patient) -> (Rig, Needle) {
     let needle = Needle::held_at(0.0);
-    let mut rig = Rig { board: board_wired(Wiring::default(), needle.plant(0)), pc: Pc::counting() };
+    let mut rig = Rig { board: board_wired(Wiring::default(), needle.plant()), pc: Pc::counting() };
     rig.pc.connect(&mut rig.board);
     rig.pc.must(&mut rig.board, Command::ConfigureDevice(upright()));
     rig.pc.must(&mut rig.board, Command::ConfigurePatient(patient));
@@ -165,12 +167,24 @@ fn press_until(rig: &mut Rig, needle: &Needle, codes: u16) {
     assert!(pressed, "{:?}", rig.board.at_stop(|stopped| stopped.drive()));
 }
 
+/// Minutes of the same core are above; here the board reads the encoder's lines itself.
 #[test]
 fn on_the_board_a_hand_that_holds_still_keeps_its_device() {
+    keeps_its_device(5);
+}
+
+#[test]
+#[ignore = "nightly: a minute of the board, 40 s"]
+fn on_the_board_a_hand_that_holds_still_longer_keeps_its_device() {
+    keeps_its_device(20);
+}
+
+/// Every patient, held still for so many seconds.
+fn keeps_its_device(seconds: u32) {
     for (name, patient) in patients() {
         let (mut rig, needle) = held_on_the_board(patient);
         let mut codes = (u16::MAX, 0);
-        for _ in 0..2_000 {
+        for _ in 0..100 * seconds {
             rig.pc.run_ms(&mut rig.board, 10);
             let drive = rig.board.at_stop(|stopped| stopped.drive());
             let faults: Vec<_> = rig.pc.heard.events.iter().map(|event| event.kind).collect();
@@ -179,7 +193,7 @@ fn on_the_board_a_hand_that_holds_still_keeps_its_device() {
             codes = (codes.0.min(code), codes.1.max(code));
         }
         let newtons = |codes: u16| f64::from(codes) / 2_047.0 * 2.88;
-        println!("| {name}, held for 20 s | {:.2} to {:.2} N |", newtons(codes.0), newtons(codes.1));
+        println!("| {name}, held for {seconds} s | {:.2} to {:.2} N |", newtons(codes.0), newtons(codes.1));
         // The tissue has relaxed below an eighth of the limit, the smallest torque that is looked
         // at.
         press_until(&mut rig, &needle, HELD_CODES);

@@ -18,10 +18,11 @@ use link::Command;
 use tests::board::ToCode;
 use tests::board::cache;
 use tests::board::plant::{self, PlantSide};
-use tests::board::{Board, MILLISECOND, Nanos};
+use tests::board::{Board, MILLISECOND, Nanos, Wiring};
 use tests::laws;
 use tests::pc::{self, Pc};
-use tests::scenario::{COUNTS_PER_MM, board, venepuncture};
+use tests::rig::Rig;
+use tests::scenario::{COUNTS_PER_MM, venepuncture};
 
 /// The tick's interrupt handler.
 const TICK: &str = "TIM4";
@@ -58,9 +59,7 @@ impl Profile {
         end: Nanos,
         mut meddle: impl FnMut(&mut Pc, &mut Board),
     ) -> (Board, Pc) {
-        let mut board = board(plant);
-        let mut pc = Pc::new();
-        pc.connect(&mut board);
+        let Rig { mut board, mut pc } = Rig::connected(Wiring::default(), plant);
         pc.configure(&mut board, &config);
         // Only with the rotor's angle is all of a compensation fed forward.
         pc.must(&mut board, Command::Index(Some(17)));
@@ -214,14 +213,13 @@ fn a_tick_takes_at_most_840_instructions() {
 /// RM0090 3.5.2: the tick's code is more than the flash's cache holds, and other tasks have used
 /// the cache since the tick before. With every line of code from the flash, without prefetch, and
 /// one and a half cycles for an instruction, the code is written before the converter takes it.
+/// Takes more than 5 s: each instruction of 18,000 ticks by itself.
 #[test]
 fn a_tick_whose_code_is_not_cached_is_done_before_the_latch() {
     for (name, compensation) in [("default", Compensation::NONE), ("all fed forward", all_fed_forward())] {
         let mut config = Config::commissioned_virtual();
         config.device.compensation = compensation;
-        let mut board = board(venepuncture(BEGIN));
-        let mut pc = Pc::new();
-        pc.connect(&mut board);
+        let Rig { mut board, mut pc } = Rig::connected(Wiring::default(), venepuncture(BEGIN));
         pc.configure(&mut board, &config);
         pc.must(&mut board, Command::Index(Some(17)));
         pc.must(&mut board, Command::Start);
@@ -262,7 +260,7 @@ fn a_tick_with_all_feedforward_takes_at_most_1260_instructions() {
 }
 
 /// In and out at 100 mm/s and more, with pauses; stopped and started again all the while the needle
-/// comes out.
+/// comes out. Takes more than 5 s: ten configurations, each on a board of its own.
 #[test]
 fn a_tick_of_the_heaviest_configurations_takes_no_more() {
     let mm = |depth: i64| depth * COUNTS_PER_MM;
@@ -297,7 +295,7 @@ fn a_tick_of_the_heaviest_configurations_takes_no_more() {
 }
 
 /// In through all layers, with a rest on the way, and out, in as many layers as there may be and in
-/// fewer.
+/// fewer. Takes more than 5 s: each number of layers on a board of its own.
 #[test]
 fn a_tick_of_the_other_laws_takes_at_most_1260_instructions() {
     type Make = fn(usize) -> Config;

@@ -6,11 +6,12 @@ use control_core::interlock::Interlock;
 use link::Command;
 use link::frames::{CommandRefusal, EventKind};
 use tests::board::wires::{Wire, Wires};
-use tests::board::{Amplifier, Effect, MILLISECOND, Nanos, Wiring};
+use tests::board::{Amplifier, Board, Effect, MILLISECOND, Nanos, Wiring};
 use tests::needle::Needle;
 use tests::pc::Pc;
 use tests::rig::{Rig, ZERO_TORQUE, task};
 use tests::scenario::board_wired;
+use tests::start::Start;
 
 /// The time limits for every fault of the drive, and for a dead channel.
 const SOON: Nanos = 5 * MILLISECOND;
@@ -22,8 +23,15 @@ const FAR: f64 = 0.002;
 
 /// A needle held 2.5 mm deep in skin, with torque on it.
 fn pressed_on(wiring: Wiring) -> (Rig, Needle) {
+    let start = Start::of("held needle, pressed", wiring, pressed_afresh);
+    let needle = start.kept::<Needle>().apart();
+    let (board, pc) = start.on(needle.plant());
+    (Rig { board, pc }, needle)
+}
+
+fn pressed_afresh(wiring: Wiring) -> (Board, Pc, Needle) {
     let needle = Needle::held_at(0.0);
-    let mut rig = Rig { board: board_wired(wiring, needle.plant(0)), pc: Pc::new() };
+    let mut rig = Rig { board: board_wired(wiring, needle.plant()), pc: Pc::new() };
     rig.pc.connect(&mut rig.board);
     rig.pc.must(&mut rig.board, Command::Zero);
     needle.change(|state| state.hand_speed = 0.0125);
@@ -34,7 +42,7 @@ fn pressed_on(wiring: Wiring) -> (Rig, Needle) {
     let drive = rig.board.at_stop(|stopped| stopped.drive());
     let code = drive.code.unwrap_or(ZERO_TORQUE);
     assert!(drive.enabled && code < ZERO_TORQUE - 200, "torque is on: {drive:?}");
-    (rig, needle)
+    (rig.board, rig.pc, needle)
 }
 
 fn pressed() -> (Rig, Needle) {

@@ -19,10 +19,7 @@ use tests::usb_host::Port;
 const TWO_TICKS: Nanos = 210_000;
 
 fn connected() -> Rig {
-    let mut rig = Rig { board: board_wired(Wiring::nucleo_f429zi(), plant::held()), pc: Pc::new() };
-    rig.pc.connect(&mut rig.board);
-    rig.pc.must(&mut rig.board, Command::Zero);
-    rig
+    Rig::zeroed(Wiring::nucleo_f429zi())
 }
 
 fn refused(rig: &mut Rig, interlock: Interlock) {
@@ -31,6 +28,7 @@ fn refused(rig: &mut Rig, interlock: Interlock) {
     assert_eq!(why, CommandRefusal::Interlocked(interlock));
 }
 
+/// Takes more than 5 s: a whole insertion, as in `control.rs`.
 #[test]
 fn it_computes_what_control_core_computes() {
     /// 30° down, on the inclinometer, as the Discovery's accelerometer has it in `control.rs`.

@@ -131,7 +131,7 @@ fn a_concealed_imbalance_is_settled_on_the_flash_image() {
 
 #[test]
 #[ignore = "nightly: a minute of the board, recorded at 10 kHz, and two diagnoses"]
-fn a_concealed_spring_in_the_drive_is_settled_on_the_flash_image() {
+fn a_concealed_drive_spring_is_settled_on_the_flash_image() {
     let settled = settled(concealed("drive_compliance.toml"), 2, "settled-compliance");
     assert_eq!(single(&settled), ["drive_compliance"], "{}", settled.conclusion);
 }

@@ -11,16 +11,8 @@ use link::frames::{CommandRefusal, EventKind, SaveError, Stage};
 use tests::board::flash::{FACTORY_OPTIONS, GUARDED_OPTIONS};
 use tests::board::wires::Wires;
 use tests::board::{Board, MILLISECOND, Wiring, elf, firmware_path, plant};
-use tests::pc::Pc;
 use tests::rig::Rig;
-use tests::scenario::{board, board_wired};
-
-fn connected(wiring: Wiring) -> Rig {
-    let mut rig = Rig { board: board_wired(wiring, plant::held()), pc: Pc::new() };
-    rig.pc.connect(&mut rig.board);
-    rig.pc.must(&mut rig.board, Command::Zero);
-    rig
-}
+use tests::scenario::board;
 
 fn is_allowed(board: &mut Board) {
     let violations = board.at_stop(|stopped| stopped.violations());
@@ -31,7 +23,7 @@ fn is_allowed(board: &mut Board) {
 /// ends before the rails do).
 #[test]
 fn full_torque_both_ways_reaches_the_pin() {
-    let mut rig = connected(Wiring::default());
+    let mut rig = Rig::zeroed(Wiring::default());
     let servo =
         Servo { stiffness: Stiffness(I16F16::from_num(0.1)), damping: Damping(I8F24::from_num(0.0005)) };
     let torque = MillinewtonMetres(I16F16::from_num(28.7));
@@ -53,10 +45,11 @@ fn full_torque_both_ways_reaches_the_pin() {
 }
 
 /// RM0090 3.9.7: a control register that is written whole locks itself; 3.6: an erasure stops the
-/// processor.
+/// processor. Takes more than 5 s: as many saves as fill both sectors, so that one of them is
+/// erased.
 #[test]
 fn three_hundred_configurations_are_all_saved() {
-    let mut rig = connected(Wiring::default());
+    let mut rig = Rig::zeroed(Wiring::default());
     let config = |number: u16| {
         let mut config = Config::commissioned_virtual();
         config.device.limits.fade_in_ms = 300 + number;
@@ -84,10 +77,10 @@ fn three_hundred_configurations_are_all_saved() {
 }
 
 /// A start that a stop overtakes, and a configuration for which there is no room: the processor may
-/// not stop with torque on.
+/// not stop with torque on. Takes more than 5 s: as many saves as fill a sector.
 #[test]
 fn a_sector_is_erased_with_the_amplifier_off_only() {
-    let mut rig = connected(Wiring::default());
+    let mut rig = Rig::zeroed(Wiring::default());
     let mut config = Config::commissioned_virtual();
     for number in 1..=140 {
         rig.pc.send(&mut rig.board, Command::Start);
@@ -112,7 +105,7 @@ fn a_sector_is_erased_with_the_amplifier_off_only() {
 
 #[test]
 fn a_configuration_that_is_not_saved_is_reported() {
-    let mut rig = connected(Wiring::default());
+    let mut rig = Rig::zeroed(Wiring::default());
     rig.board.flash().array().worn = true;
     let mut config = Config::commissioned_virtual();
     config.device.limits.fade_in_ms = 400;
@@ -127,7 +120,7 @@ fn a_configuration_that_is_not_saved_is_reported() {
 /// RM0090 5.2.3: the detector's interrupt is an edge; a supply that is low from the start has none.
 #[test]
 fn a_supply_that_is_low_from_the_start_is_seen() {
-    let mut rig = connected(Wiring { supply: 2_600, ..Wiring::default() });
+    let mut rig = Rig::zeroed(Wiring { supply: 2_600, ..Wiring::default() });
     rig.pc.run_ms(&mut rig.board, 20);
     let why = rig.pc.must_not(&mut rig.board, Command::Start);
     assert_eq!(why, CommandRefusal::Interlocked(Interlock::Supply));
@@ -140,7 +133,7 @@ fn a_supply_that_is_low_from_the_start_is_seen() {
 /// 2.59 V.
 #[test]
 fn a_configuration_is_saved_on_a_low_supply() {
-    let mut rig = connected(Wiring { supply: 2_650, ..Wiring::default() });
+    let mut rig = Rig::zeroed(Wiring { supply: 2_650, ..Wiring::default() });
     let mut config = Config::commissioned_virtual();
     config.device.limits.fade_in_ms = 333;
     rig.pc.must(&mut rig.board, Command::ConfigureDevice(config.device));
@@ -180,7 +173,7 @@ fn a_part_from_the_factory_gets_its_brown_out_reset_once() {
     assert_eq!(board.flash().array().option_writes, 1);
 
     // On a supply that is too low nothing is written, and no torque is given.
-    let mut rig = connected(Wiring { supply: 2_600, ..Wiring::default() });
+    let mut rig = Rig::zeroed(Wiring { supply: 2_600, ..Wiring::default() });
     rig.board.flash().array().options = FACTORY_OPTIONS;
     rig.board.at_stop(|stopped| stopped.reset_by_pin());
     rig.board.run_ms(50);
@@ -214,7 +207,7 @@ fn a_strap_that_is_not_there_is_not_seen() {
 /// RM0090 18.4.7: the filters of the encoder's inputs, off out of reset.
 #[test]
 fn a_glitch_of_the_motors_leads_is_no_count() {
-    let mut rig = connected(Wiring::default());
+    let mut rig = Rig::zeroed(Wiring::default());
     rig.pc.must(&mut rig.board, Command::Start);
     rig.pc.run_ms(&mut rig.board, 10);
     rig.board.at_stop(|stopped| stopped.set_wires(Wires { glitches: Some(150), ..Wires::default() }));
@@ -266,7 +259,7 @@ fn nothing_masks_the_tick_for_longer_than_the_latch_waits() {
 /// A request made before the PC left is not carried out afterwards.
 #[test]
 fn a_start_without_a_session_is_refused() {
-    let mut rig = connected(Wiring::default());
+    let mut rig = Rig::zeroed(Wiring::default());
     // Closed and opened again: nobody has said hello.
     rig.board.at_stop(|stopped| stopped.usb().host.close());
     rig.pc.set_silent(true);
@@ -282,7 +275,7 @@ fn a_start_without_a_session_is_refused() {
 #[test]
 fn a_start_that_was_under_way_when_the_pc_went_is_thrown_away() {
     for delay_us in (0..2_000).step_by(130) {
-        let mut rig = connected(Wiring::default());
+        let mut rig = Rig::zeroed(Wiring::default());
         rig.pc.send(&mut rig.board, Command::Start);
         let now = rig.board.now();
         rig.board.run_until(now + delay_us * 1_000);

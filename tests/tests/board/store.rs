@@ -3,10 +3,9 @@
 use control_core::event::Fault;
 use control_core::{Config, Device};
 use link::Command;
-use tests::board::{Board, plant};
+use tests::board::{Board, Wiring, plant};
 use tests::pc::Pc;
 use tests::rig::Rig;
-use tests::scenario::board;
 
 /// A configuration that differs from the default.
 fn changed() -> Config {
@@ -27,9 +26,7 @@ fn hash_after_reset(board: &mut Board, pc: &mut Pc) -> (u32, Option<Fault>) {
 
 #[test]
 fn a_configuration_outlives_a_reset() {
-    let mut board = board(plant::held());
-    let mut pc = Pc::new();
-    pc.connect(&mut board);
+    let Rig { mut board, mut pc } = Rig::connected(Wiring::default(), plant::held());
     let default = link::codec::hash(&Config::commissioned_virtual());
     assert_eq!(pc.heard.hello.as_ref().map(|hello| hello.config_hash), Some(default));
     pc.configure(&mut board, &changed());
@@ -39,6 +36,7 @@ fn a_configuration_outlives_a_reset() {
     assert!(violations.is_empty(), "{violations:?}");
 }
 
+/// Takes more than 5 s: a reset and a new port for every fourth write.
 #[test]
 fn power_lost_during_a_save_leaves_the_old_or_the_new() {
     power_lost_before_each(4);
@@ -61,9 +59,7 @@ fn power_lost_before_each(step: usize) {
     // The records are apart: the device's may be there and the patient's not yet.
     let half = hash(changed_one.device, default.patient);
     // How many writes a save takes.
-    let mut board = board(plant::held());
-    let mut pc = Pc::new();
-    pc.connect(&mut board);
+    let Rig { mut board, mut pc } = Rig::connected(Wiring::default(), plant::held());
     let before = board.flash().array().operations;
     pc.configure(&mut board, &changed());
     pc.run_ms(&mut board, 50);
@@ -73,9 +69,7 @@ fn power_lost_before_each(step: usize) {
 
     let mut seen = [0, 0, 0];
     // Every write in turn, on a board that keeps its flash: each save finds what the cut left.
-    let mut board = tests::scenario::board(plant::held());
-    let mut pc = Pc::new();
-    pc.connect(&mut board);
+    let Rig { mut board, mut pc } = Rig::connected(Wiring::default(), plant::held());
     for write in (0..writes).step_by(step) {
         pc.configure(&mut board, &Config::commissioned_virtual());
         pc.run_ms(&mut board, 30);
@@ -107,12 +101,7 @@ fn a_flipped_bit_in_flash_is_reported_and_costs_its_record() {
     let (default, other) = (Config::commissioned_virtual(), changed());
     // A word of the record that was written first, and one of the last.
     for is_patients in [false, true] {
-        let mut rig = {
-            let mut board = board(plant::held());
-            let mut pc = Pc::new();
-            pc.connect(&mut board);
-            Rig { board, pc }
-        };
+        let mut rig = Rig::connected(Wiring::default(), plant::held());
         rig.pc.configure(&mut rig.board, &other);
         rig.pc.run_ms(&mut rig.board, 50);
         {

@@ -108,6 +108,7 @@ fn hottest(torques: &[f64]) -> f64 {
     hottest.sqrt()
 }
 
+/// Takes more than 5 s: four time constants of the winding, with the limit and without.
 #[test]
 fn torque_falls_before_the_continuous_limit_is_exceeded() {
     let (torques, told) = hold_strong(CONTINUOUS_MNM);

@@ -3,8 +3,9 @@
 
 use link::Command;
 use link::frames::EventKind;
-use tests::board::{MILLISECOND, plant};
+use tests::board::{MILLISECOND, Wiring, plant};
 use tests::pc::Pc;
+use tests::rig::Rig;
 use tests::scenario::board;
 use tests::usb_host::Port;
 
@@ -58,9 +59,7 @@ fn a_plug_pulled_and_put_back_again_and_again() {
 
 #[test]
 fn a_bus_that_sleeps_and_wakes_carries_on() {
-    let mut board = board(plant::held());
-    let mut pc = Pc::new();
-    pc.connect(&mut board);
+    let Rig { mut board, mut pc } = Rig::connected(Wiring::default(), plant::held());
     pc.run_ms(&mut board, 50);
     board.at_stop(|stopped| stopped.usb().host.suspend());
     board.run_ms(2_000);
@@ -74,9 +73,7 @@ fn a_bus_that_sleeps_and_wakes_carries_on() {
 
 #[test]
 fn garbage_costs_the_frame_it_is_in_and_no_other() {
-    let mut board = board(plant::held());
-    let mut pc = Pc::new();
-    pc.connect(&mut board);
+    let Rig { mut board, mut pc } = Rig::connected(Wiring::default(), plant::held());
     let mut bits = 12_345_u32;
     for _ in 0..20 {
         let noise: Vec<u8> = (0..1_500)
@@ -98,9 +95,7 @@ fn garbage_costs_the_frame_it_is_in_and_no_other() {
 
 #[test]
 fn a_command_repeated_is_answered_again_and_done_once() {
-    let mut board = board(plant::held());
-    let mut pc = Pc::new();
-    pc.connect(&mut board);
+    let Rig { mut board, mut pc } = Rig::connected(Wiring::default(), plant::held());
     pc.must(&mut board, Command::Start);
     pc.run_ms(&mut board, 20);
     let started = |pc: &Pc| pc.heard.events.iter().filter(|event| event.kind == EventKind::Started).count();

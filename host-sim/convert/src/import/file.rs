@@ -16,6 +16,10 @@ pub(super) fn read(path: &Path) -> Result<Log, Error> {
         log::read(&file, &bytes)?
     } else if HDF5.iter().any(|magic| bytes.starts_with(magic)) {
         hdf5(&file, bytes)?
+    } else if ending == "mat" && is_matlab_4(&bytes) {
+        return Err(Error::input(format_args!(
+            "{file}: is a MATLAB 4 file; save it again from MATLAB with save('FILE.mat', '-v7'), or with SciPy's savemat(…, format='5')"
+        )));
     } else if let Some(advice) = unread(&bytes) {
         return Err(Error::input(format_args!("{file}: is {advice}")));
     } else if bytes.starts_with(ZIP) || bytes.starts_with(b"\x93NUMPY") {
@@ -74,6 +78,13 @@ fn unread(bytes: &[u8]) -> Option<&'static str> {
     ]
     .into_iter()
     .find_map(|(magic, what)| bytes.starts_with(magic).then_some(what))
+}
+
+/// True for the header of a MATLAB 4 matrix: its type as four decimal digits MOPT, little-endian,
+/// of which O is zero, P at most 5 and T at most 2 (MAT-File Format, chapter on level 4).
+fn is_matlab_4(bytes: &[u8]) -> bool {
+    let Some(kind) = bytes.first_chunk().map(|first| u32::from_le_bytes(*first)) else { return false };
+    kind / 100 % 10 == 0 && kind / 10 % 10 <= 5 && kind % 10 <= 2 && kind < 5_000
 }
 
 #[cfg(feature = "parquet")]

@@ -141,11 +141,17 @@ pub(super) struct Chosen {
     pub sign: f64,
 }
 
+/// The words of a column's own name: of a path, as structures and topics have them, the last part.
+fn own_words(column: &Column) -> Vec<String> {
+    column.plain.rsplit(['.', '/']).next().map(units::words).unwrap_or_default()
+}
+
 /// A role that a name suggests, and how good a match it is: 0 is the best.
 fn suggested(column: &Column) -> Option<(Role, u32)> {
     let words = units::words(&column.plain);
     let has = |list: &str| words.iter().any(|word| list.split(' ').any(|known| known == word));
-    let is = |list: &str| words.len() == 1 && has(list);
+    let own = own_words(column);
+    let is = |list: &str| own.len() == 1 && list.split(' ').any(|known| known == own[0]);
     if has("error err std var variance acceleration acc accel ddot qdd ddq temperature temp index") {
         return None;
     }
@@ -214,26 +220,37 @@ fn by_unit(quantity: Quantity) -> Option<(Role, u32)> {
 /// Every column, as errors list it: those that the file does not name with their first values,
 /// those of several files by file.
 fn listed(logs: &[Log]) -> String {
-    let of_log = |log: &Log| {
-        let mut names: Vec<String> = log
-            .tables
-            .iter()
-            .flat_map(|t| &t.columns)
-            .filter(|c| !c.name.is_empty())
-            .map(|c| if c.is_named { c.name.clone() } else { format!("{} ({})", c.name, sample(&c.values)) })
+    let in_words = |place: Place, c: &Column| match c.is_named {
+        false => format!("{} ({})", c.name, sample(&c.values)),
+        true if is_repeated(logs, place) => format!("{} (column {})", c.name, number(logs, place)),
+        true => c.name.clone(),
+    };
+    let of_log = |l: usize| {
+        let mut names: Vec<String> = columns(logs)
+            .filter(|((log, ..), c)| *log == l && !c.name.is_empty())
+            .map(|(place, c)| in_words(place, c))
             .collect();
         names.dedup();
         let more = names.len().saturating_sub(24);
         names.truncate(24);
         format!("{}{}", names.join(", "), if more > 0 { format!(" and {more} more") } else { String::new() })
     };
-    match logs {
-        [one] => of_log(one),
-        several => {
-            let each = several.iter().map(|log| format!("{} in {}", of_log(log), log.file));
-            each.collect::<Vec<_>>().join(", ")
-        }
+    if logs.len() == 1 {
+        return of_log(0);
     }
+    let each = logs.iter().enumerate().map(|(l, log)| format!("{} in {}", of_log(l), log.file));
+    each.collect::<Vec<_>>().join(", ")
+}
+
+/// True if the table of a column has another of its name.
+fn is_repeated(logs: &[Log], (log, table, column): Place) -> bool {
+    let columns = &logs[log].tables[table].columns;
+    columns.iter().filter(|c| c.name == columns[column].name).count() > 1
+}
+
+/// The number of a column from 1, by which `--column` may name it.
+fn number(logs: &[Log], place: Place) -> usize {
+    columns(logs).take_while(|(other, _)| *other != place).count() + 1
 }
 
 /// The first values of a column, as a person would know it by.
@@ -315,6 +332,15 @@ pub(super) fn choose(logs: &[Log], role: Role, choices: &[Choice]) -> Result<Opt
             return Ok(None);
         }
         let (at, sign) = said.column(logs).ok_or_else(|| nowhere(&files, said, logs))?;
+        let named = &logs[at.0].tables[at.1].columns[at.2].name;
+        if said.name.trim_start_matches('-') == named && is_repeated(logs, at) {
+            return Err(Error::input(format_args!(
+                "{}: has several columns \"{named}\"; say which by its number, as in --column {role}={}; its columns are {}",
+                logs[at.0].file,
+                number(logs, at),
+                listed(logs)
+            )));
+        }
         let unit = said.unit.or(unit_of(at).filter(|u| role.takes(u.quantity)));
         return Ok(Some(Chosen { at, unit, sign }));
     }

@@ -146,7 +146,11 @@ mod tests {
         let of = |rounds: Vec<Round>| not_told_apart(&Settled { rounds, ..Settled::default() });
         assert_eq!(of(vec![round(&twins), round(&twins)]), None, "one round was designed against it");
         assert!(of(vec![round(&twins), round(&turned), round(&twins)]).is_some());
-        assert_eq!(of(vec![round(&twins), round(&twins), round(&twins[..1])]), None, "they are told apart");
+        assert_eq!(
+            of(vec![round(&twins), round(&twins), round(&twins[..1])]),
+            None,
+            "they are distinguished"
+        );
         assert_eq!(of(vec![round(&twins[..1]); 3]), None, "a single name");
     }
 }

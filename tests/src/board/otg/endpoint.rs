@@ -1,5 +1,7 @@
 //! The registers of one endpoint in one direction, RM0090 sections 34.16.4 and 34.17.
 
+use serde::{Deserialize, Serialize};
+
 use super::registers::device::*;
 
 /// The bits of a control register that a write sets as written; the others act or are read only.
@@ -38,7 +40,7 @@ fn packet_size(number: usize, control: u32) -> usize {
 }
 
 /// An IN endpoint.
-#[derive(Debug)]
+#[derive(Debug, Serialize, Deserialize)]
 pub(super) struct InEndpoint {
     number: usize,
     pub(super) control: u32,
@@ -95,7 +97,7 @@ impl InEndpoint {
 }
 
 /// An OUT endpoint.
-#[derive(Debug)]
+#[derive(Debug, Serialize, Deserialize)]
 pub(super) struct OutEndpoint {
     number: usize,
     pub(super) control: u32,

@@ -3,13 +3,15 @@
 
 use std::collections::VecDeque;
 
+use serde::{Deserialize, Serialize};
+
 use super::registers::{PKTSTS_OUT_COMPLETE, PKTSTS_OUT_DATA, PKTSTS_SETUP_COMPLETE, PKTSTS_SETUP_DATA};
 
 /// The words of packet memory the core has.
 pub const PACKET_WORDS: u32 = 320;
 
 /// A word of the receive FIFO: the status in front of a packet, or four of its bytes.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 enum Word {
     Status(u32),
     Data(u32),
@@ -27,7 +29,7 @@ pub(super) enum Announced {
 }
 
 /// The receive FIFO, shared by every OUT endpoint.
-#[derive(Debug)]
+#[derive(Debug, Serialize, Deserialize)]
 pub(super) struct ReceiveFifo {
     words: VecDeque<Word>,
     /// Its depth in words, as `GRXFSIZ` sets it.
@@ -114,7 +116,7 @@ impl ReceiveFifo {
 }
 
 /// One transmit FIFO.
-#[derive(Debug)]
+#[derive(Debug, Serialize, Deserialize)]
 pub(super) struct TransmitFifo {
     words: VecDeque<u32>,
     /// Its depth in words, as `DIEPTXFx` sets it.

@@ -12,6 +12,8 @@ mod registers;
 
 use std::collections::BTreeMap;
 
+use serde::{Deserialize, Serialize};
+
 use crate::usb_host::wire::{Device, Handshake};
 use endpoint::{InEndpoint, OutEndpoint};
 use fifo::{Announced, ReceiveFifo, TransmitFifo};
@@ -30,7 +32,7 @@ const RESET_DEPTH: u32 = 0x200;
 const FULL_SPEED: u32 = 0b11 << 1;
 
 /// The core, out of reset.
-#[derive(Debug)]
+#[derive(Debug, Serialize, Deserialize)]
 pub struct Core {
     /// Registers that only hold what was written.
     stored: BTreeMap<u64, u32>,
