@@ -52,6 +52,9 @@ pub(crate) fn run(names: &[String]) -> Result<(), Error> {
     if errors.is_empty() { Ok(()) } else { Err(Error::new(errors.join("; "))) }
 }
 
+/// Runs of a program and of its peer, by turns.
+const TURNS: usize = 3;
+
 /// A run of the bench: the rows that are wanted, and what has been measured.
 struct Bench<'a> {
     /// All rows where it has none.
@@ -82,12 +85,39 @@ impl Bench<'_> {
         for (name, rows) in EXAMPLES {
             self.measure(&[rows], name, || programs::example(name));
         }
-        for (script, rows) in PEERS {
-            self.measure(&[rows], script, || programs::peer(script));
+        for (name, script, rows) in PEERS {
+            if self.wants(rows) {
+                self.measure_by_turns(name, script);
+            }
         }
         self.measure(&["parameter_fit_"], "parameter fit", fit::ours);
         self.measure(&["parameter_fit_"], "parameter fit with its peer", fit::with_peer);
         self.measure(&["class_"], "class", programs::class);
+    }
+
+    /// Runs a program of ours and somebody else's by turns, so that a machine that slows down slows
+    /// both, and takes the median of each value. Ours is measured where the other is absent.
+    fn measure_by_turns(&mut self, name: &str, script: &str) {
+        let (mut runs, mut is_there) = (vec![], true);
+        for _ in 0..TURNS {
+            if !self.keeps(name, programs::example(name), &mut runs) {
+                break;
+            }
+            is_there = is_there && self.keeps(script, programs::peer(script), &mut runs);
+        }
+        self.values.extend(values::medians(&runs));
+    }
+
+    /// Keeps a run, or its error, which is reported at the end; true if it is a run.
+    fn keeps(&mut self, what: &str, run: Result<Values, Error>, runs: &mut Vec<Values>) -> bool {
+        match run {
+            Ok(values) => runs.push(values),
+            Err(error) => {
+                self.errors.push(format!("{what}: {error}"));
+                return false;
+            }
+        }
+        true
     }
 
     fn measure_whole(&mut self) {

@@ -20,7 +20,7 @@ use crate::io::recording::Recording;
 use crate::io::rig::Rig;
 use crate::io::schema::{Place, Region, Stretch, Verdict};
 use crate::selection::context::FittedModel;
-use crate::selection::untested;
+use crate::selection::untested::{self, NotTested};
 use crate::validation::comparison::Shown;
 use crate::validation::confidence;
 use crate::validation::confidence_pass::{WeighedEffect, WeighedModel};
@@ -58,7 +58,7 @@ pub(crate) fn decide(
     series.extend(all_series(estimator, smoothed, &shown.on_holdout, true));
     let effects = decision.named_effects(with_named, pooled(&simulated).as_ref().is_some_and(follows_worse));
     // What is named was tested, if not in every order.
-    let is_open = |(name, _): &(EffectName, String)| effects.iter().all(|one| !one.class.contains(name));
+    let is_open = |(name, _): &(EffectName, NotTested)| effects.iter().all(|one| !one.class.contains(name));
     let untested =
         untested::untested(&prepared.span, &prepared.nominal).into_iter().filter(is_open).collect::<Vec<_>>();
     let nothing_found = matches!(verdict, Verdict::Unexplained | Verdict::RandomDisturbance);
@@ -202,7 +202,7 @@ fn unexplained_fraction(shown: &Shown, floor: f64) -> f64 {
 /// tested and those of the rig it is the whole library.
 fn hypotheses(
     weighed: &WeighedModel,
-    untested: &[(EffectName, String)],
+    untested: &[(EffectName, NotTested)],
     nominal: &Nominal,
 ) -> Vec<JudgedHypothesis> {
     let of_effect = |effect: &WeighedEffect| JudgedHypothesis {

@@ -5,6 +5,7 @@ use crate::estimation::blocked_recording::BlockedRecording;
 use crate::io::rig::Rig;
 use crate::io::schema::{FitTable, Parameter, Place, Simulation, Verdict};
 use crate::selection::free_form::{Inputs, Shape};
+use crate::selection::untested::NotTested;
 use crate::simulation::comparison::Comparison;
 use crate::validation::confidence::Evidence;
 use crate::validation::known_travel::BeyondFitted;
@@ -71,8 +72,8 @@ pub(crate) struct Complete {
     pub(crate) hypotheses: Vec<JudgedHypothesis>,
     /// The models that contend for the least decided name; none where every name is single.
     pub(crate) contenders: Vec<Contender>,
-    /// Effects that these recordings could not show, with the reason as a clause.
-    pub(crate) untested: Vec<(EffectName, String)>,
+    /// Effects that these recordings could not show, with the reason.
+    pub(crate) untested: Vec<(EffectName, NotTested)>,
     /// Force errors under the three models.
     pub(crate) errors: FitTable,
     /// The values that the refit moved.

@@ -251,7 +251,7 @@ impl Outcome {
             untested: diagnosis
                 .untested
                 .into_iter()
-                .map(|(name, because)| Untested { name, because })
+                .map(|(name, why)| Untested { name, because: text::not_tested(&why, kind.length()) })
                 .collect(),
             contenders,
             reason: diagnosis.reason.map(|reason| text::reason(&reason, form.as_deref())),

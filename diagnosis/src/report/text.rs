@@ -2,7 +2,9 @@
 //! the headline. Nothing reads one to decide.
 
 use crate::numerics::bootstrap::Gain;
+use crate::numerics::digits::short;
 use crate::pipeline::diagnosis::Reason;
+use crate::selection::untested::NotTested;
 use crate::thresholds::{CERTAIN_Z, LEAST_SHARE, MATERIAL, SURE_Z, UNLIKELY_Z, UNSURE_SHARE};
 use crate::validation::rejection::{Rather, Rejection, Weakness};
 
@@ -98,6 +100,37 @@ fn weakness(weakest: &Weakness) -> String {
         Weakness::LeftOver { part } => {
             format!("{:.0} % of what the refit leaves beyond chance remains with it", 100.0 * part)
         }
+    }
+}
+
+/// Says why an effect was not looked for, as a clause; `unit` is that of the travel.
+pub(crate) fn not_tested(why: &NotTested, unit: &str) -> String {
+    match why {
+        NotTested::InertiaHardlyMatters => {
+            "it shows only where the inertia matters, and in this motion it hardly does".into()
+        }
+        NotTested::TravelTooShort { travel, needed } => format!(
+            "the travel is {} {unit}, and at least {} {unit} would be needed",
+            short(*travel),
+            short(*needed)
+        ),
+        NotTested::OrdersTooLong { turns, up_to } => {
+            let (orders, shown) = match *up_to > 1.0 {
+                true => (format!("orders 1 to {up_to}"), "all"),
+                false => ("order 1".to_owned(), "it"),
+            };
+            format!(
+                "a travel of {} turns is too short for {orders}; one turn would show {shown}",
+                short(*turns)
+            )
+        }
+        NotTested::NoColumn(column) => format!("a column `{column}` that changes would be needed"),
+        NotTested::NoCommonStart => {
+            "recordings that start at one place would be needed, with `start_spread` or `absolute` in the rig"
+                .into()
+        }
+        NotTested::SameAsWeight => "the rig's weight under this tilt is the same force".into(),
+        NotTested::NoMotion => "these recordings have no motion that would show it".into(),
     }
 }
 

@@ -46,6 +46,19 @@ pub(crate) fn values_in(text: &str) -> Values {
     values
 }
 
+/// The median of each value over some runs; what is no number is as the first run has it.
+pub(crate) fn medians(runs: &[Values]) -> Values {
+    let mut all = Values::new();
+    for (name, first) in runs.iter().flatten() {
+        let of_runs = runs.iter().filter_map(|run| run.get(name)?.parse::<f64>().ok());
+        let mut numbers: Vec<f64> = of_runs.collect();
+        numbers.sort_by(f64::total_cmp);
+        let median = numbers.get(numbers.len() / 2).map_or_else(|| first.clone(), ToString::to_string);
+        all.entry(name.clone()).or_insert(median);
+    }
+    all
+}
+
 /// Somebody else's number for the same thing.
 pub(crate) struct Peer {
     pub(crate) who: String,
@@ -70,6 +83,19 @@ mod tests {
         assert_eq!(values["tick_host_ns"], "81.5");
         let peer = peer(&values, "tick_host_ns").unwrap();
         assert_eq!((peer.who.as_str(), peer.value), ("idsp", 90.0));
+    }
+
+    #[test]
+    fn runs_by_turns_give_their_medians() {
+        let run = |ns: &str, peer: Option<&str>| {
+            let peer = peer.map(|ns| format!("tick_host_ns.peer=idsp tick_host_ns.peer_value={ns}"));
+            values_in(&format!("tick_host_ns={ns} {}", peer.unwrap_or_default()))
+        };
+        let all = medians(&[run("80", None), run("300", None), run("81", None)]);
+        assert_eq!(all, run("81", None), "one slow run moves nothing");
+        let absent = medians(&[run("80", Some("91")), run("82", None), run("84", Some("90"))]);
+        let peer = peer(&absent, "tick_host_ns").expect("it ran twice");
+        assert_eq!((peer.who.as_str(), absent["tick_host_ns"].as_str()), ("idsp", "82"));
     }
 
     #[test]
