@@ -83,8 +83,8 @@ pub(crate) fn example(name: &str) -> Result<Values, Error> {
     shell::output(Command::new(program).env(MESH, mesh())).map(|text| values_in(&text))
 }
 
-/// Examples that measure by turns with other people's solvers of the same tasks, in Python, and what
-/// the rows that they give begin with.
+/// Examples that measure by turns with other people's solvers of the same tasks, in Python, and
+/// what the rows that they give begin with.
 pub(crate) const PEERS: [(&str, &str, &str); 3] = [
     ("plant_speed", "plant.py", "plant_"),
     ("xpbd_speed", "soft_body.py", "xpbd_"),
