@@ -140,7 +140,7 @@ fn a_concealed_drive_spring_is_settled_on_the_flash_image() {
 #[ignore = "nightly: half a minute of the board, recorded at 10 kHz, and its diagnosis, 40 s"]
 fn cogging_is_settled_on_the_flash_image() {
     let mechanism = SharedMechanism::new(Mechanism::new(ROTOR, TILT));
-    let settled = settled(mechanism.plant(), 2, "settled");
+    let settled = settled(mechanism.plant(), 1, "settled");
     // The mechanism has a weight, too, which the data sheet does not tell.
     let names: Vec<&str> = settled.names.iter().map(|name| name.name.as_str()).collect();
     assert_eq!(names, ["cogging", "tilt_gravity"], "{}", settled.conclusion);
