@@ -112,7 +112,7 @@ impl EffectReport for Defined {
         vec![size, Reported::new("time_constant", fitted.shape("time_constant"), "s")]
     }
     fn is_size(&self, value: &str) -> bool {
-        !value.starts_with("period") && value != "time_constant"
+        value != "time_constant"
     }
     fn form_sd(&self, value: &str) -> f64 {
         if value == "time_constant" { 0.06 } else { 0.04 }

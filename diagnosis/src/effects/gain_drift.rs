@@ -144,7 +144,7 @@ impl EffectReport for Defined {
         ]
     }
     fn is_size(&self, value: &str) -> bool {
-        !value.starts_with("period") && value != "time_constant"
+        value != "time_constant"
     }
     fn form_sd(&self, value: &str) -> f64 {
         if value == "time_constant" { 0.06 } else { 0.04 }

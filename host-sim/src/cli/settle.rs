@@ -31,10 +31,10 @@ enum Source {
 /// Let a device settle its own diagnosis: record, diagnose, design the deciding experiment, and
 /// record again.
 ///
-/// At most five rounds and three minutes of motion, within the device's ceilings of torque and
-/// travel. It ends when one name is left or nothing tells the rest apart. Then the device feeds
-/// forward what was settled, and what a hand feels more than before is taken back. It writes a
-/// folder for each round (recordings, experiment, report), settle.json, settle.html,
+/// Two to five rounds and at most three minutes of motion, within the device's ceilings of torque
+/// and travel. It ends when one name is left or nothing distinguishes the rest. Then the device
+/// feeds forward what was settled, and what a hand feels more than before is taken back. It writes
+/// a folder for each round (recordings, experiment, report), settle.json, settle.html,
 /// compensation.html and device.toml.
 #[derive(Args)]
 #[command(after_help = examples!("Examples:

@@ -105,6 +105,9 @@ fn columns_of_one_name_are_told_apart_by_their_numbers() {
     let path = written(out, "repeated.csv", table("log.t,value,value").as_bytes());
     let sentence = "has several columns \"value\"; say which by its number, as in --column position=2; its columns are log.t, value (column 2), value (column 3)";
     assert_refused(out, vec![(path.clone(), &["--undriven", "--column", "position=value:rad"], sentence)]);
+    let alike = written(out, "alike.csv", table("log.t,theta,theta").as_bytes());
+    let asked = "could both be the position; say which with --column position=2";
+    assert_refused(out, vec![(alike, &["--undriven"], asked)]);
     let result = out.join("result");
     let numbered =
         ["import", text(&path), "--column", "position=2:rad", "--undriven", "--out", text(&result)];

@@ -248,6 +248,13 @@ fn is_repeated(logs: &[Log], (log, table, column): Place) -> bool {
     columns.iter().filter(|c| c.name == columns[column].name).count() > 1
 }
 
+/// The name or, where the table has several of that name, the number by which `--column` finds a
+/// column.
+fn handle(logs: &[Log], place: Place) -> String {
+    let name = || logs[place.0].tables[place.1].columns[place.2].name.clone();
+    if is_repeated(logs, place) { number(logs, place).to_string() } else { name() }
+}
+
 /// The number of a column from 1, by which `--column` may name it.
 fn number(logs: &[Log], place: Place) -> usize {
     columns(logs).take_while(|(other, _)| *other != place).count() + 1
@@ -362,7 +369,7 @@ pub(super) fn choose(logs: &[Log], role: Role, choices: &[Choice]) -> Result<Opt
                 files.join(", "),
                 a.2.name,
                 b.2.name,
-                option(role, &a.2.name, None)
+                option(role, &handle(logs, a.1), None)
             )))
         }
         [first, ..] => {

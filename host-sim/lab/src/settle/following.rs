@@ -58,7 +58,10 @@ fn not_told_apart(settled: &Settled) -> Option<String> {
         later.iter().all(|round| round.names.iter().any(|name| has_members(&name.class, class)))
     };
     let class = first.names.iter().map(|name| &name.class).find(|class| class.len() > 1 && is_same(class))?;
-    Some(format!("{DESIGNED_AGAINST} inputs designed to tell them apart leave {}", class.join(" or ")))
+    Some(format!(
+        "{} is left after {DESIGNED_AGAINST} inputs that were designed to distinguish them",
+        class.join(" or ")
+    ))
 }
 
 fn has_members(a: &[String], b: &[String]) -> bool {
@@ -105,9 +108,9 @@ fn next(
         Inputs::Designed if report.verdict == Verdict::InsufficientExcitation => {
             limited.general_again("the recordings so far could not tell", most_s).map(Ok)
         }
-        Inputs::Designed if report.contenders.is_empty() => {
-            limited.general_again("nothing contends: other numbers show whether it stays so", most_s).map(Ok)
-        }
+        Inputs::Designed if report.contenders.is_empty() => limited
+            .general_again("no rival is left; other speeds and forces show whether that holds", most_s)
+            .map(Ok),
         Inputs::Designed => {
             let (travel, speed, force) = limited.limits();
             let case = match Case::read(folder, Some(travel), Some(speed), Some(force)) {

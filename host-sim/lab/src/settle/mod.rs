@@ -43,8 +43,7 @@ pub enum Inputs {
     /// The excitations of `characterise`, shortened to the motion that is allowed, in one round,
     /// for comparison.
     Characterise,
-    /// The needle pushed in and drawn out as in practice, in one round, for comparison: nothing is
-    /// asked.
+    /// The needle pushed in and drawn out as in practice, in one round, for comparison.
     Passive,
 }
 

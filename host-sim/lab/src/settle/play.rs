@@ -97,7 +97,7 @@ impl Limited {
             (Signal::Triangle { stroke: rad(stroke), speed: rad(speed) }, part)
         };
         let input = together(PRACTICE.map(strokes), seconds);
-        self.of_input(&input, "in and out as in practice: nothing is asked".into(), None)
+        self.of_input(&input, "strokes as in practice, for comparison".into(), None)
     }
 
     /// A round of a designed input.
