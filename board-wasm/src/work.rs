@@ -173,7 +173,7 @@ fn within(what: &str, value: f64, least: f64, most: f64) -> Result<(), Error> {
 
 async fn commission(wish: Wish, shared: Rc<RefCell<Shared>>) -> Result<Finding, Error> {
     ask(&shared, &NEEDLE_OUT, false).await?;
-    let mut line = BrowserLine(Rc::clone(&shared));
+    let mut line = BrowserLine::new(&shared);
     let asks = async |step: commission::Step| ask(&shared, &step, step.moves()).await;
     let outcome = commission::commission(&mut line, &wish, asks).await?;
     Ok(Finding { lines: outcome.lines(), file: outcome.to_toml("board")? })
@@ -181,9 +181,10 @@ async fn commission(wish: Wish, shared: Rc<RefCell<Shared>>) -> Result<Finding, 
 
 async fn compensation(rig: Rig, share: f64, shared: Rc<RefCell<Shared>>) -> Result<Finding, Error> {
     ask(&shared, &NEEDLE_OUT, false).await?;
-    let mut line = BrowserLine(Rc::clone(&shared));
+    let mut line = BrowserLine::new(&shared);
     let asks = async |step: compensate::Step| ask(&shared, &step, step.moves()).await;
-    let outcome = compensate::compensate(&mut line, &rig, share, asks).await?;
+    let wish = compensate::Wish { share, ..compensate::Wish::default() };
+    let outcome = compensate::compensate(&mut line, &rig, wish, asks).await?;
     let finding = Finding { lines: outcome.lines(), file: device_config::to_toml("board", &outcome.record)? };
     outcome.refusal().map_or(Ok(finding), Err)
 }
@@ -209,17 +210,31 @@ async fn ask(shared: &RefCell<Shared>, step: &dyn Display, moves: bool) -> Resul
 }
 
 /// The board behind the browser's serial port.
-struct BrowserLine(Rc<RefCell<Shared>>);
+struct BrowserLine {
+    shared: Rc<RefCell<Shared>>,
+    /// The device gets back what it had, also after a person has left.
+    is_restoring: bool,
+}
+
+impl BrowserLine {
+    fn new(shared: &Rc<RefCell<Shared>>) -> Self {
+        Self { shared: Rc::clone(shared), is_restoring: false }
+    }
+}
 
 impl Line for BrowserLine {
     fn exchange(&mut self, out: &[u8], into: &mut Vec<u8>) -> Result<Duration, Error> {
-        let mut shared = self.0.borrow_mut();
-        if shared.guide.is_left() {
+        let mut shared = self.shared.borrow_mut();
+        if shared.guide.is_left() && !self.is_restoring {
             return Err(Error::failed(LEFT));
         }
         shared.out.extend(out);
         into.append(&mut shared.heard);
         Ok(shared.now)
+    }
+
+    fn restores(&mut self) {
+        self.is_restoring = true;
     }
 
     fn act(&mut self, _: Act) {}

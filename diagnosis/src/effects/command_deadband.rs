@@ -55,7 +55,7 @@ impl EffectReport for Defined {
         Subsystem::Actuator
     }
     fn words(&self) -> &'static str {
-        "small commands do nothing"
+        "a dead band of the command"
     }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         vec![Reported::new("half_width", fitted.shape("half_width"), fitted.command.clone())]

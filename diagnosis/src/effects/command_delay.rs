@@ -55,7 +55,7 @@ impl EffectReport for Defined {
         Subsystem::Actuator
     }
     fn words(&self) -> &'static str {
-        "the drive applies the command late"
+        "a delay between command and torque"
     }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         vec![Reported::new("delay", fitted.shape("delay"), "s")]

@@ -67,7 +67,7 @@ impl EffectReport for Defined {
         Subsystem::Actuator
     }
     fn words(&self) -> &'static str {
-        "the drive clips large commands"
+        "clipping of large commands"
     }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         let limit = Reported::new("limit", fitted.shape("limit"), fitted.command.clone());

@@ -38,7 +38,7 @@ impl EffectReport for Defined {
         Subsystem::Sensor
     }
     fn words(&self) -> &'static str {
-        "the encoder errs once per turn"
+        "an encoder error once per turn"
     }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         vec![Reported::new("amplitude", waves::amplitude(fitted), fitted.length)]

@@ -134,7 +134,7 @@ impl EffectReport for Defined {
         Subsystem::Actuator
     }
     fn words(&self) -> &'static str {
-        "the torque constant changes as the recording goes on"
+        "a torque constant that drifts"
     }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         let (change, sd) = fitted.term(0);

@@ -65,7 +65,7 @@ impl EffectReport for Defined {
         Subsystem::Sensor
     }
     fn words(&self) -> &'static str {
-        "the encoder loses counts"
+        "lost encoder counts"
     }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         // All the counts that were lost in the fitted recordings, whichever way.

@@ -321,6 +321,20 @@ impl Effect {
         waves
     }
 
+    /// Checks that a law has every coefficient that is given: it would count as zero.
+    fn check_coefficients(&self) -> Result<(), String> {
+        let Some(law) = self.name.definition().law(self) else { return Ok(()) };
+        let names = law.names();
+        match self.coefficients.keys().find(|key| !names.contains(key)) {
+            None => Ok(()),
+            Some(other) => Err(format!(
+                "coefficients.{other} is not a value of {}, which has {}",
+                self.name,
+                names.join(", ")
+            )),
+        }
+    }
+
     /// Checks that the shape holds the values that the effect's file declares and no other.
     fn check_keys(&self) -> Result<(), String> {
         if self.name.formula().is_some() {
@@ -363,6 +377,7 @@ impl Effect {
             }
         }
         self.check_keys()?;
+        self.check_coefficients()?;
         for (key, value) in &self.shape {
             if (key.starts_with("period_") || key == "turn" || key == "per_command") && *value == 0.0 {
                 return Err(format!("shape.{key} must not be zero"));

@@ -112,7 +112,7 @@ impl EffectReport for Defined {
         Subsystem::Transmission
     }
     fn words(&self) -> &'static str {
-        "the drive slips above a force limit"
+        "slip of the drive above a force limit"
     }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         // The load's part of what the drive would need to press as hard.

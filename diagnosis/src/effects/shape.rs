@@ -114,5 +114,12 @@ mod tests {
         assert_eq!(said(EffectName::CommandDelay, &[]), "shape.delay is required and must be above zero");
         let cogging = Effect::shaped(EffectName::Cogging, &[("turn", 6.0), ("order_7", 7.0)]);
         assert_eq!(cogging.check(), Ok(()));
+        let mut drag = Effect::shaped(EffectName::QuadraticDrag, &[]);
+        drag.coefficients.insert("coeficient".into(), 1e-7);
+        let said = drag.check().expect_err("it would count as zero");
+        assert!(
+            said.starts_with("coefficients.coeficient is not a value of quadratic_drag, which has "),
+            "{said}"
+        );
     }
 }

@@ -20,9 +20,18 @@ use crate::validation::holdout_set::HoldoutSet;
 use crate::validation::parameters;
 use crate::validation::rejection::Rejection;
 use crate::validation::residuals::forces;
+use std::cell::Cell;
 
 /// Most candidates that are judged per effect that may be named: who asks often enough hears a yes.
 const TRIED: usize = 3;
+
+/// The part of a diagnosis that is done when the search begins and when it ends, and the share of
+/// the rest that each of its steps takes, for the progress that people see.
+const BEGUN: f64 = 0.15;
+const SEARCHED: f64 = 0.85;
+const STEP: f64 = 0.15;
+/// The stage that people see.
+const SEARCHING: &str = "searching for what was left out";
 
 /// The result of the search.
 pub(crate) struct Found {
@@ -37,10 +46,10 @@ pub(crate) struct Found {
 
 /// Searches for the effects that explain what the nominal model leaves.
 pub(crate) fn search(prepared: &Prepared, progress: Progress) -> Found {
-    let search = Search { prepared, progress };
+    let search = Search { prepared, progress, done: Cell::new(BEGUN) };
     let mut tried = Tried::default();
     let grown = search.forward_selection(search.start(), &mut tried);
-    progress("judging on held-out recordings", 0.8);
+    search.goes_on("judging on held-out recordings");
     let mut found = search.backward_elimination(grown);
     tried.excluded = found.standing.rejected.iter().map(|rejected| rejected.name).collect();
     if !found.standing.effects.is_empty() && !tried.excluded.is_empty() {
@@ -89,9 +98,18 @@ struct Next {
 struct Search<'a> {
     prepared: &'a Prepared,
     progress: Progress<'a>,
+    /// The part of the whole diagnosis that is done, 0 to 1.
+    done: Cell<f64>,
 }
 
 impl Search<'_> {
+    /// Tells that a step is done. Nobody knows how many follow, so each takes the same share of the
+    /// rest.
+    fn goes_on(&self, stage: &str) {
+        self.done.set(self.done.get() + STEP * (SEARCHED - self.done.get()));
+        (self.progress)(stage, self.done.get());
+    }
+
     fn context<'a>(&'a self, tracks: &'a [BlockedRecording]) -> FitContext<'a> {
         self.prepared.context(tracks)
     }
@@ -110,7 +128,6 @@ impl Search<'_> {
         let mut before = None;
         while now.white.model.effects.len() < MOST {
             let step = now.white.model.effects.len();
-            (self.progress)("searching for what was left out", 0.15 + 0.2 * step as f64);
             let Some(next) = self.with_one_more(&now, tried, TRIED * (step + 1)) else { break };
             if !next.generalises && before.is_some() {
                 break;
@@ -155,8 +172,11 @@ impl Search<'_> {
     /// to; at most `most` may have been judged by then.
     fn with_one_more(&self, now: &SearchState, tried: &mut Tried, most: usize) -> Option<Next> {
         let on = self.context(&now.tracks);
+        self.goes_on(SEARCHING);
         let candidates = on.screen(&now.white, &|name| !tried.excluded.contains(&name));
+        self.goes_on(SEARCHING);
         let mut finalists = on.finalists(&now.white, &candidates);
+        self.goes_on(SEARCHING);
         on.polish(&mut finalists);
         order_near_ties(&on, now.white.merit, &mut finalists);
         if now.white.model.effects.is_empty() && !tried.plain {
@@ -172,6 +192,7 @@ impl Search<'_> {
                 break;
             }
             tried.count += 1;
+            self.goes_on(SEARCHING);
             let name = finalist.model.effects.last().expect("a finalist adds an effect").name;
             match self.judge(now, finalist, promising.is_none()) {
                 Judged::Generalises(state) => return Some(Next { state, generalises: true }),

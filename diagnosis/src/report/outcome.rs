@@ -86,7 +86,7 @@ pub(crate) fn sentence(report: &Report, kind: Kind) -> String {
             percent(fit.refit.holdout)
         ),
         Verdict::Unexplained => format!(
-            "Simulation and recordings differ repeatably by {:.1} % of the force, and no known effect explains it{}",
+            "Simulation and recordings differ repeatably by {:.1} % of the force, and no effect is sure enough to be named{}",
             percent(fit.refit.holdout),
             report.reason.as_ref().map_or(String::new(), |reason| format!(": {reason}"))
         ),

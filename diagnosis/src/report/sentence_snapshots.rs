@@ -43,7 +43,7 @@ fn every_verdict_says_its_sentence() {
     let region = Region { variable: "speed".into(), low: 0.02, high: 1.5 };
     let found = vec![
         named(N::CoulombFriction, 0.97, &[N::CoulombFriction, N::AsymmetricFriction], vec![region]),
-        named(N::ElectricalLag, 0.91, &[N::ElectricalLag], Vec::new()),
+        named(N::CommandDeadband, 0.91, &[N::CommandDeadband], Vec::new()),
     ];
     let rest = "a.csv is at rest: it moves by 0 counts in all; record a motion of some turns";
     let cases = [

@@ -40,6 +40,10 @@ pub trait Line {
     /// The newest sample of what has come.
     fn saw(&mut self, _newest: &Sample) {}
 
+    /// Announces that the torque is taken off and the device given back what it had: that is done
+    /// even after a person has stopped.
+    fn restores(&mut self) {}
+
     /// The crash that ended the device's last run.
     fn crashed(&mut self, _crash: &Crash) {}
 }
@@ -54,6 +58,7 @@ pub struct Bench<'a> {
     record: Option<Record>,
     fault: Option<Fault>,
     not_saved: Option<String>,
+    played_ticks: usize,
 }
 
 impl<'a> Bench<'a> {
@@ -70,6 +75,7 @@ impl<'a> Bench<'a> {
             record: None,
             fault: None,
             not_saved: None,
+            played_ticks: 0,
         };
         bench.settle().await?;
         Ok(bench)
@@ -103,6 +109,23 @@ impl<'a> Bench<'a> {
     pub async fn configure(&mut self, device: &Device) -> Result<(), Error> {
         self.driver.configure_device(*device);
         self.becomes(device).await.map(drop)
+    }
+
+    /// Takes the torque off and gives the device its part back, even after a person has stopped.
+    pub(crate) async fn restore(&mut self, device: &Device) -> Result<(), Error> {
+        self.line.restores();
+        self.samples.clear();
+        self.driver.stop();
+        let end = self.now + TO_ANSWER;
+        let is_off = |sample: &Sample| [State::Idle as u8, State::Fault as u8].contains(&sample.state);
+        // Once Stop is answered, the reason why an earlier command was refused is forgotten.
+        while self.driver.notice().is_some() || !self.samples.last().is_some_and(is_off) {
+            self.exchange().await?;
+            if self.now > end {
+                return Err(Error::failed("the device did not take its torque off; switch it off"));
+            }
+        }
+        self.configure(device).await
     }
 
     /// Has the device, which `device` is what was found of, take itself for commissioned: it looks
@@ -173,8 +196,14 @@ impl<'a> Bench<'a> {
             bench.fault.is_some() || bench.samples.last().is_some_and(|sample| !is_played(sample))
         })
         .await?;
-        let played = self.samples.iter().copied().filter(is_played).collect();
+        let played: Vec<Sample> = self.samples.iter().copied().filter(is_played).collect();
+        self.played_ticks += played.len();
         Ok((played, self.fault))
+    }
+
+    /// The motion that has been played since the conversation began, s.
+    pub(crate) fn played_s(&self) -> f64 {
+        self.played_ticks as f64 / f64::from(TICK_HZ)
     }
 
     async fn until(&mut self, why_not: &str, is_so: impl Fn(&Self) -> bool) -> Result<(), Error> {

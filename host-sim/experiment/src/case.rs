@@ -13,14 +13,19 @@ const LEAST_PROBABILITY: f64 = 0.01;
 const FEWEST_STEPS: f64 = 20.0;
 /// Least probability of a contender that the report names as the possible truth of a named effect.
 const LEAST_OF_CLASS: f64 = 0.05;
+/// Part of the way ahead that an input may go behind its begin where no recording did: a servo that
+/// returns there overshoots.
+const LEAST_BACK: f64 = 0.02;
 /// The most contenders that are compared.
 const MOST_RIVALS: usize = 5;
 
 /// The limits of a machine, in the coordinate of its rig.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Limits {
-    /// Largest distance from where an input begins, rad or m.
+    /// Largest distance ahead of where an input begins, rad or m.
     pub travel: f64,
+    /// Largest distance behind it, rad or m.
+    pub back: f64,
     /// rad/s or m/s.
     pub speed: f64,
     /// N·m or N.
@@ -30,8 +35,8 @@ pub struct Limits {
 impl Limits {
     /// Returns the part of the limits that an input may use.
     pub(crate) fn usable(self) -> Self {
-        let Self { travel, speed, force } = self;
-        Self { travel: MARGIN * travel, speed: MARGIN * speed, force: MARGIN * force }
+        let Self { travel, back, speed, force } = self;
+        Self { travel: MARGIN * travel, back: MARGIN * back, speed: MARGIN * speed, force: MARGIN * force }
     }
 }
 
@@ -87,8 +92,13 @@ impl Case {
                 folder.display()
             )
         })?;
-        let limits =
-            Limits { travel: travel.unwrap_or(shown.travel), speed: speed.unwrap_or(shown.speed), force };
+        // Where only recordings tell, an input stays where they were: it may begin at a stop.
+        let limits = Limits {
+            travel: travel.unwrap_or(shown.ahead),
+            back: travel.unwrap_or(shown.behind.max(LEAST_BACK * shown.ahead)),
+            speed: speed.unwrap_or(shown.speed),
+            force,
+        };
         for (name, value) in [("travel", limits.travel), ("speed", limits.speed), ("force", limits.force)] {
             if !(value.is_finite() && value > 0.0) {
                 return Err(format!("--{name} must be a number above zero; correct it"));
@@ -155,7 +165,9 @@ fn is_other(effect: &diagnosis::report::Named, name: &str) -> bool {
 
 /// The motion that the report's recordings showed.
 struct Shown {
-    travel: f64,
+    /// Farthest ahead of where a recording began, and behind it.
+    ahead: f64,
+    behind: f64,
     speed: f64,
     /// Longest mean time between two residuals of a recording, s.
     reading_s: f64,
@@ -167,7 +179,7 @@ impl Shown {
         let text = std::fs::read_to_string(path).map_err(|cause| {
             format!("{}: the residuals cannot be read ({cause}); diagnose again", path.display())
         })?;
-        let mut shown = Self { travel: 0.0, speed: 0.0, reading_s: 0.0 };
+        let mut shown = Self { ahead: 0.0, behind: 0.0, speed: 0.0, reading_s: 0.0 };
         let (mut file, mut before, mut place, mut low, mut high) =
             (String::new(), 0.0, 0.0, 0.0_f64, 0.0_f64);
         let (mut begin, mut steps) = (0.0, 0.0);
@@ -185,7 +197,7 @@ impl Shown {
             }
             before = time;
             (low, high) = (low.min(place), high.max(place));
-            shown.travel = shown.travel.max(high - low);
+            (shown.ahead, shown.behind) = (shown.ahead.max(high), shown.behind.max(-low));
             shown.speed = shown.speed.max(velocity.abs());
             if steps >= FEWEST_STEPS {
                 shown.reading_s = shown.reading_s.max((time - begin) / steps);

@@ -52,8 +52,10 @@ impl Prediction {
     /// True if the motion stays within limits.
     pub fn is_within(&self, limits: &Limits, gain: f64) -> bool {
         let most = |column: &[f64]| column.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
-        let (travel, speed) = (most(&self.position), most(&self.velocity));
+        let ahead = self.position.iter().copied().fold(0.0, f64::max);
+        let behind = -self.position.iter().copied().fold(0.0, f64::min);
+        let is_inside = ahead <= limits.travel && behind <= limits.back;
         // A force at its limit was cut there: the input asks for more than may be.
-        travel <= limits.travel && speed <= limits.speed && most(&self.command) * gain.abs() < limits.force
+        is_inside && most(&self.velocity) <= limits.speed && most(&self.command) * gain.abs() < limits.force
     }
 }

@@ -24,7 +24,7 @@ fn rival(name: &str, probability: f64, effects: Vec<Effect>) -> Rival {
 }
 
 fn case(rivals: Vec<Rival>) -> Case {
-    let limits = Limits { travel: 60.0, speed: 65.0, force: 0.02 };
+    let limits = Limits { travel: 60.0, back: 60.0, speed: 65.0, force: 0.02 };
     Case { rivals, disturbance: 2e-5, bandwidth_hz: 40.0, reading_s: 2.5e-3, limits }
 }
 
@@ -73,7 +73,7 @@ fn a_slow_log_of_a_heavy_joint_gets_what_it_can_show() {
         rival.rig.model.viscous = Some(0.05);
         rival.rig.actuator.gain = 1.0;
     }
-    case.limits = Limits { travel: 3.0, speed: 3.0, force: 6.0 };
+    case.limits = Limits { travel: 3.0, back: 3.0, speed: 3.0, force: 6.0 };
     (case.disturbance, case.bandwidth_hz, case.reading_s) = (0.05, 12.0, 5e-3);
     let design = design(&case, 20.0, 1).expect("the limits are those of a joint");
     let segments = &design.chosen.input.segments;
@@ -111,12 +111,23 @@ fn a_rival_that_can_imitate_by_other_values_is_not_told_apart() {
 #[test]
 fn no_rival_leaves_the_limits_less_a_fifth() {
     let mut case = delay_or_lag();
-    case.limits = Limits { travel: 2.0, speed: 5.0, force: 0.004 };
+    case.limits = Limits { travel: 2.0, back: 2.0, speed: 5.0, force: 0.004 };
     let design = design(&case, 12.0, 3).expect("some inputs are within the limits");
     for (prediction, rival) in design.predictions.iter().zip(&design.case.rivals) {
         let most = |column: &[f64]| column.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
         assert!(most(&prediction.position) <= 1.6 && most(&prediction.velocity) <= 4.0);
         assert!(most(&prediction.command) * rival.rig.actuator.gain <= 0.0032);
+    }
+}
+
+#[test]
+fn an_input_that_begins_at_a_stop_does_not_go_behind_it() {
+    let mut case = delay_or_lag();
+    case.limits = Limits { travel: 60.0, back: 0.5, speed: 65.0, force: 0.02 };
+    let design = design(&case, 12.0, 3).expect("strokes go ahead only");
+    for prediction in &design.predictions {
+        let least = prediction.position.iter().copied().fold(0.0, f64::min);
+        assert!(least >= -0.4, "{least} rad");
     }
 }
 

@@ -8,7 +8,7 @@ use diagnosis::rig::Rig;
 use lab::characterise::{self, written};
 use lab::commission::bench::{GuidedLine, Line, WireLine};
 use lab::commission::mechanism::VirtualLine;
-use lab::compensate::{self, Step, files};
+use lab::compensate::{self, Step, Wish, files};
 use live::serial::SerialPort;
 use live::serving::stop_on_signals;
 use live::{examples, say};
@@ -97,8 +97,8 @@ impl Compensate {
             let angle = compensate::align(&mut line, rig)?;
             return Ok(vec![format!("angle index_counts={} agreement={:.3}", angle.count, angle.agreement)]);
         }
-        let outcome =
-            compensate::compensate(&mut line, rig, self.gain, |step| consent.ask(&step, step.moves()))?;
+        let wish = Wish { share: self.gain, ..Wish::default() };
+        let outcome = compensate::compensate(&mut line, rig, wish, |step| consent.ask(&step, step.moves()))?;
         let written = match &self.out {
             Some(out) => files::write(out, &self.device, &outcome)?,
             None => Vec::new(),

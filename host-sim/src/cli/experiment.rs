@@ -22,8 +22,8 @@ pub(crate) struct Experiment {
     /// The folder that `diagnose` wrote
     #[arg(long, value_name = "DIR")]
     report: PathBuf,
-    /// Largest distance from where the input begins, rad or m (default: the most in the report's
-    /// recordings)
+    /// Largest distance from where the input begins, rad or m (default: as far ahead and as far
+    /// back as the report's recordings went from where they began)
     #[arg(long, value_name = "RAD|M")]
     travel: Option<f64>,
     /// Largest speed, rad/s or m/s (default: the most in the report's recordings)

@@ -10,10 +10,11 @@ use std::path::PathBuf;
 /// Make rig.toml and CSV files, which `diagnose` reads, from recordings of any other program.
 ///
 /// Reads tables as text (any separator, decimal commas, comments, a row of units, no header,
-/// channels in rows), NumPy's .npz, MATLAB's .mat (not -v7.3), JSON, MCAP with messages in JSON,
-/// with `--features ros` ROS 2 bags in MCAP, and with `--features parquet` Parquet and LeRobot
-/// datasets. Says what it took for what, what it changed and what it left out. Values that no
-/// recording tells stand as nan in rig.toml, to be filled in.
+/// channels in rows), NumPy's .npz, MATLAB's .mat, JSON, MCAP with messages in JSON; with
+/// `--features hdf5` HDF5 and MATLAB's -v7.3, with `--features ros` ROS 2 bags in MCAP, and with
+/// `--features parquet` Parquet and LeRobot datasets. Says what it took for what, what it changed
+/// and what it left out. Values that recordings do not contain are written as nan in rig.toml, to
+/// be filled in.
 #[derive(Args)]
 #[command(after_help = examples!("Examples:
   host-sim import run1.csv run2.csv --out imported

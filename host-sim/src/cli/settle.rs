@@ -31,11 +31,11 @@ enum Source {
 /// Let a device settle its own diagnosis: record, diagnose, design the deciding experiment, and
 /// record again.
 ///
-/// Two to five rounds and at most three minutes of motion, within the device's ceilings of torque
-/// and travel. It ends when one name is left or nothing distinguishes the rest. Then the device
-/// feeds forward what was settled, and what a hand feels more than before is taken back. It writes
-/// a folder for each round (recordings, experiment, report), settle.json, settle.html,
-/// compensation.html and device.toml.
+/// Two to five rounds and at most three minutes of motion, of which feeding forward keeps 55 s,
+/// within the device's ceilings of torque and travel. It ends when one name is left or nothing
+/// distinguishes the rest. Then the device feeds forward what was settled, and what a hand feels
+/// more than before is taken back. It writes a folder for each round (recordings, experiment,
+/// report), settle.json, settle.html, compensation.html and device.toml.
 #[derive(Args)]
 #[command(after_help = examples!("Examples:
   host-sim settle --plant hidden.toml --out /tmp/settled
@@ -130,18 +130,26 @@ impl Settle {
             }
             match progress {
                 Progress::Asked(number, asked, why) => {
+                    bar = None;
                     consent.ask(&format_args!("round {number}: {asked}; why: {why}: hands off"), true)?;
                 }
                 Progress::Played { seconds, of } => {
                     bar.get_or_insert_with(|| Bar::new("playing")).show(seconds, Some(of), "s");
                     consent.tell(&format!("{seconds:.0} of {of:.0} s played"));
                 }
-                Progress::Diagnoses => {
-                    bar = None;
-                    note!("  diagnosing all recordings so far");
-                    consent.tell("Diagnosing all recordings so far; this takes half a minute or more.");
+                Progress::Diagnoses(part) => {
+                    if part == 0.0 {
+                        note!("  diagnosing all recordings so far");
+                        bar = Some(Bar::new("diagnosing"));
+                    }
+                    let percent = 100.0 * part;
+                    if let Some(bar) = &mut bar {
+                        bar.show(percent, Some(100.0), "%");
+                    }
+                    consent.tell(&format!("Diagnosing all recordings so far: {percent:.0} % done."));
                 }
                 Progress::Said(sentence) => {
+                    bar = None;
                     note!("  {sentence}.");
                     consent.tell(&format!("{sentence}."));
                 }
@@ -180,10 +188,12 @@ fn said(settled: &Settled, out: &Path) -> Vec<String> {
     lines.push(format!("{}.", settled.conclusion));
     lines.extend(settled.unsure_in_words().map(|sentence| format!("{sentence}.")));
     match &settled.feel {
-        Some(Ok(Feel { before, after, notes })) => {
+        Some(Ok(Feel { before, after, motion_s, notes })) => {
             lines.extend(notes.iter().cloned());
             let (before, after) = (1e3 * before.all(), 1e3 * after.all());
-            lines.push(format!("a hand feels the mechanism with {after:.1} mN rms, {before:.1} before"));
+            lines.push(format!(
+                "a hand feels the mechanism with {after:.1} mN rms, {before:.1} before ({motion_s:.0} s of slow motion)"
+            ));
         }
         Some(Err(why)) => lines.push(why.clone()),
         None => {}

@@ -9,7 +9,7 @@ use device_sim::named_files::Text;
 use diagnosis::rig::Rig;
 use fixed::types::I16F16;
 use lab::commission::mechanism::VirtualLine;
-use lab::compensate::{self, coefficients, page};
+use lab::compensate::{self, Wish, coefficients, page};
 use std::path::PathBuf;
 
 fn rig(name: &str) -> Rig {
@@ -25,7 +25,7 @@ fn line(hidden: &Rig) -> VirtualLine {
 fn compensation_leaves_a_quarter_of_the_found_force() {
     let mut steps = Vec::new();
     let mut line = line(&rig("hidden.toml"));
-    let outcome = compensate::compensate(&mut line, &rig("hidden-found.toml"), 1.0, |step| {
+    let outcome = compensate::compensate(&mut line, &rig("hidden-found.toml"), Wish::default(), |step| {
         steps.push(step.to_string());
         Ok(())
     })
@@ -54,7 +54,7 @@ fn compensation_leaves_a_quarter_of_the_found_force() {
 /// Compensates and checks that no phase is felt more afterwards than before.
 fn compensated(found: &Rig) -> (VirtualLine, compensate::Outcome, Vec<String>) {
     let (mut line, mut steps) = (line(rig_hidden()), Vec::new());
-    let outcome = compensate::compensate(&mut line, found, 1.0, |step| {
+    let outcome = compensate::compensate(&mut line, found, Wish::default(), |step| {
         steps.push(step.to_string());
         Ok(())
     })
@@ -134,11 +134,12 @@ fn the_numbers_are_those_of_the_mechanism_on_the_devices_scale() {
 fn an_unstable_or_foreign_compensation_is_refused_at_rest() {
     let asked = |rig: &Rig, share: f64| {
         let mut asked = false;
-        let why = compensate::compensate(&mut line(rig_hidden()), rig, share, |_| {
-            asked = true;
-            Ok(())
-        })
-        .expect_err("it is refused");
+        let why =
+            compensate::compensate(&mut line(rig_hidden()), rig, Wish { share, ..Wish::default() }, |_| {
+                asked = true;
+                Ok(())
+            })
+            .expect_err("it is refused");
         assert!(!asked, "a step was asked for: {why}");
         why.to_string()
     };
@@ -165,7 +166,8 @@ fn rig_hidden() -> &'static Rig {
 fn the_slow_turn_detects_a_different_mechanism() {
     let mut other = rig("hidden.toml");
     other.effects.clear();
-    let why = compensate::compensate(&mut line(&other), &rig("hidden-found.toml"), 1.0, |_| Ok(()));
+    let why =
+        compensate::compensate(&mut line(&other), &rig("hidden-found.toml"), Wish::default(), |_| Ok(()));
     let why = why.expect_err("it has no cogging").to_string();
     assert!(why.contains("the rotor's angle was not found"), "{why}");
 }

@@ -6,6 +6,8 @@ use device_sim::device::{Port, Wire};
 use device_sim::error::Error;
 use diagnosis::rig::Rig;
 use lab::characterise::mechanism::BareDevice;
+use lab::commission::bench::WireLine;
+use lab::compensate::{self, Step, Wish};
 use lab::settle::{Inputs, Plant, Progress, Settings, Subject, settle};
 use link::codec::MAX_FRAME;
 use std::collections::VecDeque;
@@ -47,6 +49,8 @@ fn what_was_settled_is_fed_forward_and_the_hand_feels_less() {
     let json: serde_json::Value = serde_json::from_str(&json).expect("JSON");
     let hold = json["feel"]["after_mn_rms"]["hold"].as_f64().expect("a number");
     assert!((hold - 1e3 * feel.after.hold).abs() < 1e-9);
+    // The turns each way and 6 s of holding, before and after.
+    assert!((30.0..120.0).contains(&feel.motion_s), "{} s", feel.motion_s);
     for file in ["device.toml", "compensation.html", "settle.html"] {
         assert!(out.join(file).is_file(), "{file}");
     }
@@ -205,4 +209,41 @@ fn a_person_refuses_the_first_movement() {
     });
     assert_eq!(refused.expect_err("it was refused").to_string(), "not now");
     assert!(!out.join("round-1").exists(), "nothing was played");
+}
+
+/// A person presses Stop while the roller shows what would be fed forward: the device gets back
+/// what it had, although nothing else is sent after a stop. Takes 25 s, in real time.
+#[test]
+fn a_stop_while_feeding_forward_gives_back_what_the_device_had() {
+    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../tests/fixtures/hidden-found.toml");
+    let found = Rig::read(&path).expect("a rig");
+    let stop = Arc::new(AtomicBool::new(false));
+    let mut port = behind();
+    let device = port.0.clone();
+    let before = *device.lock().expect("nobody panicked").plan().device();
+    let presses = {
+        let (device, stop) = (device.clone(), stop.clone());
+        move || {
+            std::thread::sleep(Duration::from_secs(4));
+            let feeds = *device.lock().expect("nobody panicked").plan().device() != before;
+            stop.store(true, Ordering::Relaxed);
+            feeds
+        }
+    };
+    let mut pressed = None;
+    let mut line = WireLine::new(port.open().expect("it is there"), &stop);
+    let mut steps = Vec::new();
+    let ended = compensate::compensate(&mut line, &found, Wish::default(), |step| {
+        steps.push(step.to_string());
+        if step == Step::After {
+            pressed = Some(std::thread::spawn(presses.clone()));
+        }
+        Ok(())
+    });
+    let feeds = pressed.expect("it was tried").join().expect("nobody panicked");
+    assert!(feeds, "what is to be taken back was never in the device");
+    let said = ended.expect_err("it was stopped").to_string();
+    assert!(said.contains("stopped") && !said.contains("may still feed forward"), "{said}");
+    assert!(steps.len() >= 3, "{steps:?}");
+    assert_eq!(*device.lock().expect("nobody panicked").plan().device(), before);
 }

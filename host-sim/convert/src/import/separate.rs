@@ -10,10 +10,15 @@ use std::path::Path;
 /// Clocks that begin with the recording tell two runs apart where their lengths differ by this
 /// part.
 const ANOTHER_LENGTH: f64 = 0.01;
-/// Words by which people tell their runs apart.
+/// Words by which people distinguish their runs.
 const RUNS: &str = "fit holdout train training test val valid validation verify estimation identification run runs trial take \
-                    rep repeat exp experiment session rec recording log slow slower fast faster up down left right low high \
+                    rep repeat exp experiment session rec recording log slow slower fast faster \
                     day night before after first second third one two three monday tuesday wednesday thursday friday";
+/// Words for parts of a machine: a number after one of them is no number of a run.
+const PARTS: &str =
+    "joint joints motor axis axes sensor channel ch encoder drive actuator wheel leg arm finger side";
+/// Letters for axes of a machine.
+const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// Refuses files of which nothing says whether they are runs; `wholes` holds the rows of each of
 /// `logs`.
@@ -71,14 +76,21 @@ fn names_are_of_runs(a: &str, b: &str) -> bool {
         words.iter().flat_map(|word| numbers_apart(word)).collect::<Vec<_>>()
     };
     let (a, b) = (words(a), words(b));
-    let of_runs = |word: &String| {
-        word.chars().count() == 1
-            || word.bytes().all(|c| c.is_ascii_digit())
-            || RUNS.split_whitespace().any(|known| known == word)
+    let known = |list: &str, word: &str| list.split_whitespace().any(|known| known == word);
+    let of_runs = |(before, word): (Option<&String>, &String)| {
+        let is_short = word.chars().count() == 1 || word.bytes().all(|c| c.is_ascii_digit());
+        let is_of_part = AXES.contains(&word.as_str()) || before.is_some_and(|before| known(PARTS, before));
+        (is_short && !is_of_part) || known(RUNS, word)
     };
-    let mut only = a.iter().filter(|w| !b.contains(w)).chain(b.iter().filter(|w| !a.contains(w))).peekable();
+    let mut only = only_in(&a, &b).chain(only_in(&b, &a)).peekable();
     // The same words in another folder say as little as the same name.
     only.peek().is_some() && only.all(of_runs)
+}
+
+/// The words of `a` that `b` does not have, each with the word before it.
+fn only_in<'a>(a: &'a [String], b: &'a [String]) -> impl Iterator<Item = (Option<&'a String>, &'a String)> {
+    let before = std::iter::once(None).chain(a.iter().map(Some));
+    before.zip(a).filter(|(_, word)| !b.contains(word))
 }
 
 /// `run12b` as `run`, `12`, `b`.
@@ -125,11 +137,19 @@ mod tests {
             ("fit.csv", "holdout.csv"),
             ("x/log-a.csv", "log-b.csv"),
             ("log.csv", "log2.csv"),
+            ("joint1_run1.csv", "joint1_run2.csv"),
         ] {
             assert!(names_are_of_runs(a, b), "{a} {b}");
         }
-        for (a, b) in [("position.csv", "torque.csv"), ("motor.csv", "load.csv"), ("a/log.csv", "b/log.csv")]
-        {
+        for (a, b) in [
+            ("position.csv", "torque.csv"),
+            ("motor.csv", "load.csv"),
+            ("a/log.csv", "b/log.csv"),
+            ("joint1.csv", "joint2.csv"),
+            ("motor_a.csv", "motor_b.csv"),
+            ("left.csv", "right.csv"),
+            ("log_x.csv", "log_y.csv"),
+        ] {
             assert!(!names_are_of_runs(a, b), "{a} {b}");
         }
     }

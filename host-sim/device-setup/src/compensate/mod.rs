@@ -62,6 +62,8 @@ pub struct Outcome {
     pub taken_back: Vec<String>,
     /// False where everything was taken back: the device is configured as it was before.
     pub is_compensated: bool,
+    /// The motion that all of it took, s.
+    pub motion_s: f64,
 }
 
 impl Outcome {
@@ -94,14 +96,29 @@ impl Outcome {
     }
 }
 
-/// Compensates the device behind `line` for what `rig` found, with gains at `share` of the most
-/// that is usual; `ask` is told each step before it is done, and may end it. No phase is felt more
-/// afterwards than before: what makes one worse is taken back. Where it ends early, the device is
-/// given back what it had before.
+/// The wishes of whoever compensates.
+#[derive(Clone, Copy, Debug)]
+pub struct Wish {
+    /// The gains, as a share of the most that is usual, 0 to 1.
+    pub share: f64,
+    /// No part is tried without once this much motion is over, s.
+    pub motion_s: f64,
+}
+
+impl Default for Wish {
+    fn default() -> Self {
+        Self { share: 1.0, motion_s: f64::INFINITY }
+    }
+}
+
+/// Compensates the device behind `line` for what `rig` found; `ask` is told each step before it is
+/// done, and may end it. No phase is felt more afterwards than before, and all together are felt
+/// less: what makes one worse is taken back. Where it ends early, the device is given back what it
+/// had before.
 pub async fn compensate(
     line: &mut dyn Line,
     rig: &Rig,
-    share: f64,
+    wish: Wish,
     mut ask: impl AsyncFnMut(Step) -> Result<(), Error>,
 ) -> Result<Outcome, Error> {
     let mut bench = Bench::open(line).await?;
@@ -109,15 +126,20 @@ pub async fn compensate(
     if !device.commissioned {
         return Err(Error::failed("the device has not been commissioned; run host-sim commission first"));
     }
-    let found = coefficients::found(rig, &device, share)?;
+    let found = coefficients::found(rig, &device, wish.share)?;
     plan(&Device { compensation: found.compensation, ..device })?;
-    let mut work = Work { bench: &mut bench, before: device, found, ask: &mut ask };
+    let mut work = Work { bench: &mut bench, before: device, found, ask: &mut ask, wish, is_changed: false };
     let outcome = work.run().await;
-    if outcome.is_err() {
-        // A device that does not answer any longer keeps what it has.
-        let _ = bench.configure(&device).await;
+    let is_changed = work.is_changed;
+    match outcome {
+        Ok(outcome) => Ok(outcome),
+        Err(error) => match bench.restore(&device).await {
+            Err(why) if is_changed => Err(Error::failed(format_args!(
+                "{error}; the device may still feed forward what was being tried ({why}); compensate again"
+            ))),
+            _ => Err(error),
+        },
     }
-    outcome
 }
 
 fn plan(device: &Device) -> Result<Plan, Error> {
@@ -132,6 +154,9 @@ struct Work<'a, 'b, A> {
     before: Device,
     found: Found,
     ask: &'a mut A,
+    wish: Wish,
+    /// True once the device has another part than before.
+    is_changed: bool,
 }
 
 /// A device as it was tried, and what a hand would feel of it.
@@ -172,6 +197,7 @@ impl<A: AsyncFnMut(Step) -> Result<(), Error>> Work<'_, '_, A> {
             left_out: std::mem::take(&mut self.found.left_out),
             taken_back,
             is_compensated,
+            motion_s: self.bench.played_s(),
         })
     }
 
@@ -215,7 +241,8 @@ impl<A: AsyncFnMut(Step) -> Result<(), Error>> Work<'_, '_, A> {
             let parts: Vec<Part> =
                 fed(&kept.device).into_iter().filter(|(_, is_fed)| *is_fed).map(|(part, _)| part).collect();
             // Without its last part it is the device as it was.
-            for part in parts.iter().copied().filter(|_| parts.len() > 1) {
+            let may_try = parts.len() > 1 && self.bench.played_s() < self.wish.motion_s;
+            for part in parts.iter().copied().filter(|_| may_try) {
                 let mut device = kept.device;
                 *part.gain(&mut device.compensation.gains) = Gain(0);
                 let trial = self.try_it(&device, angle, Step::Without(part)).await?;
@@ -231,6 +258,14 @@ impl<A: AsyncFnMut(Step) -> Result<(), Error>> Work<'_, '_, A> {
             taken_back.push(said(part, before, &kept.felt));
             kept = trial;
         }
+        if kept.felt.all() >= before.all() {
+            taken_back.push(format!(
+                "all of it was taken back: with it the hand felt {:.1} mN rms, {:.1} before",
+                kept.felt.all() * 1e3,
+                before.all() * 1e3
+            ));
+            return Ok((None, taken_back));
+        }
         // The last one tried need not be the one that is kept.
         self.configure(&kept.device, angle).await?;
         Ok((Some(kept), taken_back))
@@ -243,9 +278,9 @@ impl<A: AsyncFnMut(Step) -> Result<(), Error>> Work<'_, '_, A> {
         step: Step,
     ) -> Result<Trial, Error> {
         let radius = device.roller_radius.0.to_num::<f64>();
+        (self.ask)(step).await?;
         self.bench.settle().await?;
         self.configure(device, angle).await?;
-        (self.ask)(step).await?;
         let (turns, hold) = excitations(self.found.inertia, radius, true);
         let fed = play(self.bench, &turns, &hold).await?;
         let felt = felt::felt(&plan(device)?, (&turns, &fed.0), (&hold, &fed.1))?;
@@ -253,6 +288,7 @@ impl<A: AsyncFnMut(Step) -> Result<(), Error>> Work<'_, '_, A> {
     }
 
     async fn configure(&mut self, device: &Device, angle: Option<angle::Angle>) -> Result<(), Error> {
+        self.is_changed = true;
         self.bench.configure(device).await?;
         match angle {
             Some(angle) => self.bench.index(angle.count).await,

@@ -38,6 +38,10 @@ impl<L: Line> Line for GuidedLine<L> {
         }
     }
 
+    fn restores(&mut self) {
+        self.line.restores();
+    }
+
     fn crashed(&mut self, crash: &Crash) {
         eprintln!("host-sim: {crash}");
     }
@@ -48,12 +52,14 @@ pub struct WireLine<'a> {
     wire: Box<dyn Wire>,
     begin: Instant,
     stop: &'a AtomicBool,
+    /// The device gets back what it had, also after a stop.
+    is_restoring: bool,
 }
 
 impl<'a> WireLine<'a> {
     /// `stop` ends the conversation.
     pub fn new(wire: Box<dyn Wire>, stop: &'a AtomicBool) -> Self {
-        Self { wire, begin: Instant::now(), stop }
+        Self { wire, begin: Instant::now(), stop, is_restoring: false }
     }
 }
 
@@ -62,7 +68,7 @@ impl Line for WireLine<'_> {
         let gone = |cause: std::io::Error| {
             Error::failed(format_args!("the device went away ({cause}); plug it in and begin again"))
         };
-        if self.stop.load(Ordering::Relaxed) {
+        if self.stop.load(Ordering::Relaxed) && !self.is_restoring {
             // A device whose heartbeat ends takes its torque away by itself.
             return Err(Error::failed("stopped before the end; begin again from the first step"));
         }
@@ -73,6 +79,10 @@ impl Line for WireLine<'_> {
         let count = self.wire.read(&mut bytes, PATIENCE).map_err(gone)?;
         into.extend(&bytes[..count]);
         Ok(self.begin.elapsed())
+    }
+
+    fn restores(&mut self) {
+        self.is_restoring = true;
     }
 
     fn act(&mut self, _: Act) {}

@@ -4,7 +4,7 @@
 pub mod files;
 pub mod page;
 
-pub use device_setup::compensate::{Outcome, Part, Step, angle, coefficients, felt, weight};
+pub use device_setup::compensate::{Outcome, Part, Step, Wish, angle, coefficients, felt, weight};
 
 use crate::commission::bench::Line;
 use device_setup::pause::block_on;
@@ -24,15 +24,15 @@ pub fn read_report(dir: &Path) -> Result<Rig, Error> {
     Rig::read(&path).map_err(Error::input)
 }
 
-/// Compensates the device behind `line` for what `rig` found, with gains at `share` of the most
-/// that is usual; `ask` is told each step before it is done, and may end it.
+/// Compensates the device behind `line` for what `rig` found; `ask` is told each step before it is
+/// done, and may end it.
 pub fn compensate(
     line: &mut dyn Line,
     rig: &Rig,
-    share: f64,
+    wish: Wish,
     mut ask: impl FnMut(Step) -> Result<(), Error>,
 ) -> Result<Outcome, Error> {
-    block_on(device_setup::compensate::compensate(line, rig, share, async |step| ask(step)))
+    block_on(device_setup::compensate::compensate(line, rig, wish, async |step| ask(step)))
 }
 
 /// Finds the rotor's angle again on a device that was compensated and then restarted.

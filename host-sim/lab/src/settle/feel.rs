@@ -4,7 +4,7 @@
 use super::subject::Subject;
 use super::{Progress, Settings};
 use crate::compensate::felt::Felt;
-use crate::compensate::{self, files};
+use crate::compensate::{self, Outcome, Wish, files};
 use device_sim::error::Error;
 use diagnosis::rig::Rig;
 
@@ -15,12 +15,15 @@ pub struct Feel {
     pub before: Felt,
     /// With what it feeds forward.
     pub after: Felt,
+    /// The motion that it took to feed forward and to compare, s.
+    pub motion_s: f64,
     /// The parts that were taken back or cannot be fed forward, a sentence each.
     pub notes: Vec<String>,
 }
 
 /// Feeds forward what `rig` has beyond its plain values, and writes the page and the device's part
-/// beside `settle.html`. The sentence where nothing is fed forward.
+/// beside `settle.html`; the roller has a radius of `radius_mm`. The sentence where nothing is fed
+/// forward.
 ///
 /// # Errors
 /// A sentence if a person ends it or a file cannot be written.
@@ -28,12 +31,12 @@ pub(super) fn feel(
     subject: &mut Subject,
     rig: &Rig,
     settings: &Settings,
-    radius_mm: f64,
+    (radius_mm, wish): (f64, Wish),
     progress: &mut impl FnMut(Progress) -> Result<(), Error>,
 ) -> Result<Result<Feel, String>, Error> {
     let mut ended = None;
     let outcome = subject.talk(radius_mm, |line| {
-        compensate::compensate(line, rig, 1.0, |step| {
+        compensate::compensate(line, rig, wish, |step| {
             progress(Progress::Feeds(step)).map_err(|error| {
                 let sentence = error.to_string();
                 ended = Some(error);
@@ -53,5 +56,6 @@ pub(super) fn feel(
     if !outcome.is_compensated {
         return Ok(Err(format!("nothing is fed forward: {}", notes.join("; "))));
     }
-    Ok(Ok(Feel { before: outcome.before, after: outcome.after, notes }))
+    let Outcome { before, after, motion_s, .. } = outcome;
+    Ok(Ok(Feel { before, after, motion_s, notes }))
 }

@@ -24,14 +24,14 @@ pub(super) fn following(
     settled: &Settled,
 ) -> Result<Result<Asked, String>, Error> {
     let (played, rounds) = (settled.motion_s(), settled.rounds.len());
-    let left_s = settings.motion_s - played;
+    let left_s = settings.rounds_s() - played;
     let is_sure = settled.unsure.is_empty() || settings.inputs != Inputs::Designed;
     if let Some(conclusion) =
         is_settled(report, settled, LEAST_ROUNDS.min(settings.rounds)).filter(|_| is_sure)
     {
         return Ok(Err(conclusion));
     }
-    if let Some(conclusion) = not_told_apart(settled).filter(|_| settings.inputs == Inputs::Designed) {
+    if let Some(conclusion) = not_distinguished(settled).filter(|_| settings.inputs == Inputs::Designed) {
         return Ok(Err(conclusion));
     }
     if rounds >= settings.rounds {
@@ -40,27 +40,34 @@ pub(super) fn following(
     if left_s < LEAST_ROUND_S {
         return Ok(Err(format!(
             "{played:.0} s of motion were played, and {:.0} s are allowed",
-            settings.motion_s
+            settings.rounds_s()
         )));
     }
-    next(limited, report, folder, settings, (rounds as u64 + settings.seed, left_s))
+    next(limited, report, folder, settings, (rounds, left_s))
 }
+
+/// Speeds and forces of later general rounds, as parts of those of the first of them: a round that
+/// repeats another shows nothing new.
+const PACES: [f64; 4] = [1.0, 0.75, 0.88, 0.66];
 
 /// Rounds that are designed against a class before it stays as it is.
 const DESIGNED_AGAINST: usize = 2;
 
-/// The conclusion if inputs that were designed to tell the members of a class apart left all of
+/// The conclusion if inputs that were designed to distinguish the members of a class left all of
 /// them.
-fn not_told_apart(settled: &Settled) -> Option<String> {
+fn not_distinguished(settled: &Settled) -> Option<String> {
     let since = settled.rounds.len().checked_sub(DESIGNED_AGAINST + 1)?;
     let [first, later @ ..] = &settled.rounds[since..] else { return None };
     let is_same = |class: &[String]| {
-        later.iter().all(|round| round.names.iter().any(|name| has_members(&name.class, class)))
+        later.iter().all(|round| {
+            class.iter().all(|member| round.designed_against.contains(member))
+                && round.names.iter().any(|name| has_members(&name.class, class))
+        })
     };
     let class = first.names.iter().map(|name| &name.class).find(|class| class.len() > 1 && is_same(class))?;
     Some(format!(
-        "{} is left after {DESIGNED_AGAINST} inputs that were designed to distinguish them",
-        class.join(" or ")
+        "{DESIGNED_AGAINST} inputs that were designed to distinguish {} did not",
+        class.join(" from ")
     ))
 }
 
@@ -83,21 +90,23 @@ fn is_settled(report: &Report, settled: &Settled, least_rounds: usize) -> Option
     if settled.rounds.len() < least_rounds {
         return None;
     }
-    let names: Vec<&str> = report.effects.iter().map(|effect| effect.name.as_str()).collect();
-    Some(match names[..] {
-        [] => "no effect contends: the simulation leaves out nothing that these inputs show".to_owned(),
-        _ => format!("{} is left, and no rival", names.join(" and ")),
+    Some(if report.effects.is_empty() {
+        "no effect contends: the simulation leaves out nothing that these inputs show".to_owned()
+    } else {
+        "no rival is left".to_owned()
     })
 }
 
-/// The next round, or why there is none; `number` seeds it and `left_s` is the motion that is left.
+/// The next round after `rounds`, or why there is none; `left_s` is the motion that is left.
 fn next(
     limited: &Limited,
     report: &Report,
     folder: &Path,
     settings: &Settings,
-    (seed, left_s): (u64, f64),
+    (rounds, left_s): (usize, f64),
 ) -> Result<Result<Asked, String>, Error> {
+    let seed = rounds as u64 + settings.seed;
+    let again = |why: &str, most_s| limited.general_again(why, PACES[(rounds - 1) % PACES.len()], most_s);
     let most_s = INPUT_S.min(0.5 * left_s);
     match settings.inputs {
         Inputs::Characterise => {
@@ -106,11 +115,11 @@ fn next(
         Inputs::Passive => Ok(Err("recordings of practice have no further round".into())),
         Inputs::Multisines => limited.multisine(seed, most_s).map(Ok),
         Inputs::Designed if report.verdict == Verdict::InsufficientExcitation => {
-            limited.general_again("the recordings so far could not tell", most_s).map(Ok)
+            again("the recordings so far could not tell", most_s).map(Ok)
         }
-        Inputs::Designed if report.contenders.is_empty() => limited
-            .general_again("no rival is left; other speeds and forces show whether that holds", most_s)
-            .map(Ok),
+        Inputs::Designed if report.contenders.is_empty() => {
+            again("no rival is left; other speeds and forces show whether that holds", most_s).map(Ok)
+        }
         Inputs::Designed => {
             let (travel, speed, force) = limited.limits();
             let case = match Case::read(folder, Some(travel), Some(speed), Some(force)) {
@@ -139,14 +148,15 @@ mod tests {
         let class: Vec<String> = class.iter().map(|name| (*name).to_owned()).collect();
         let names = vec![Name { name: class[0].clone(), class, confidence: 0.9 }];
         let (asked, why, sentence) = (String::new(), String::new(), String::new());
-        Round { asked, why, seconds: 20.0, sentence, contenders: vec![], names }
+        let designed_against = ["command_delay", "electrical_lag", "none"].map(str::to_owned).to_vec();
+        Round { asked, why, designed_against, seconds: 20.0, sentence, contenders: vec![], names }
     }
 
     #[test]
     fn two_designed_rounds_that_leave_a_class_are_enough() {
         let twins = ["electrical_lag", "command_delay"];
         let turned = ["command_delay", "electrical_lag"];
-        let of = |rounds: Vec<Round>| not_told_apart(&Settled { rounds, ..Settled::default() });
+        let of = |rounds: Vec<Round>| not_distinguished(&Settled { rounds, ..Settled::default() });
         assert_eq!(of(vec![round(&twins), round(&twins)]), None, "one round was designed against it");
         assert!(of(vec![round(&twins), round(&turned), round(&twins)]).is_some());
         assert_eq!(
@@ -155,5 +165,8 @@ mod tests {
             "they are distinguished"
         );
         assert_eq!(of(vec![round(&twins[..1]); 3]), None, "a single name");
+        let general = Round { designed_against: vec![], ..round(&twins) };
+        let rounds = vec![round(&twins), round(&twins), general];
+        assert_eq!(of(rounds), None, "the last input was not designed against it");
     }
 }

@@ -1,5 +1,5 @@
-//! `settle`: a device records, diagnoses, designs the experiment that tells the remaining rivals
-//! apart, and records again, until one name is left or nothing tells the rest apart. What was
+//! `settle`: a device records, diagnoses, designs the experiment that distinguishes the remaining
+//! rivals, and records again, until one name is left or nothing tells the rest apart. What was
 //! settled is fed forward by the device, as far as it can be.
 
 mod feel;
@@ -16,8 +16,9 @@ pub use subject::Subject;
 
 use crate::characterise::programme::{Programme, programmes};
 use crate::characterise::written;
-use crate::compensate;
+use crate::compensate::{self, Wish};
 use device_sim::error::Error;
+use diagnosis::effects::EffectName;
 use diagnosis::report::Report;
 use diagnosis::rig::Rig;
 use diagnosis::{Outcome, Request};
@@ -25,6 +26,7 @@ use experiment::{Design, Input};
 use following::following;
 use play::Limited;
 use std::path::{Path, PathBuf};
+use std::sync::Mutex;
 
 /// The most rounds, and the most motion of all rounds together, s.
 pub const MOST_ROUNDS: usize = 5;
@@ -32,6 +34,9 @@ pub const MOST_ROUNDS: usize = 5;
 pub const MOST_MOTION_S: f64 = 180.0;
 /// The longest input of the first round, s, which is general.
 const GENERAL_S: f64 = 12.0;
+/// Motion that is kept for feeding forward what was settled, s: slow turns and a hold, before and
+/// after, and turns for a weight that is not known.
+const FEEL_S: f64 = 55.0;
 
 /// The source of each round's input.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -63,7 +68,7 @@ pub struct Settings {
     pub inputs: Inputs,
     /// The most rounds.
     pub rounds: usize,
-    /// The most motion of all rounds together, s.
+    /// The most motion of all rounds together, s; what is fed forward keeps 55 s of the 180.
     pub motion_s: f64,
     /// Seed of the inputs.
     pub seed: u64,
@@ -76,6 +81,12 @@ pub struct Settings {
 }
 
 impl Settings {
+    /// The most motion of the rounds, s: what is fed forward moves too.
+    fn rounds_s(&self) -> f64 {
+        let feel_s = if self.compensate { FEEL_S } else { 0.0 };
+        self.motion_s.min(MOST_MOTION_S - feel_s)
+    }
+
     /// The most rounds that inputs of this kind have.
     fn most_rounds(&self) -> usize {
         if matches!(self.inputs, Inputs::Characterise | Inputs::Passive) { 1 } else { self.rounds }
@@ -89,6 +100,8 @@ pub struct Round {
     pub asked: String,
     /// Why it was asked.
     pub why: String,
+    /// Names that its input was designed to distinguish; none for another input.
+    pub designed_against: Vec<String>,
     /// Motion of this round, s.
     pub seconds: f64,
     /// The sentence of the diagnosis of all recordings so far.
@@ -100,7 +113,7 @@ pub struct Round {
     pub names: Vec<Name>,
 }
 
-/// A named effect at the end.
+/// A named effect.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Name {
     /// Its name.
@@ -110,6 +123,19 @@ pub struct Name {
     /// Probability that the class holds the truth; in the outcome of a run, with all its looks
     /// counted.
     pub confidence: f64,
+}
+
+impl Name {
+    /// Returns its class in the words of the report.
+    pub fn in_words(&self) -> String {
+        let words: Vec<&str> = self.class.iter().map(|name| effect_in_words(name)).collect();
+        words.join(" or ")
+    }
+}
+
+/// Returns the words of the report for an effect's name, or the name itself if it has none.
+fn effect_in_words(name: &str) -> &str {
+    EffectName::find(name).map_or(name, |effect| effect.in_words())
 }
 
 /// The outcome.
@@ -140,8 +166,8 @@ impl Settled {
         let rounds: Vec<Vec<Name>> = self.rounds.iter().map(|round| round.names.clone()).collect();
         self.unsure.iter().map(move |name| {
             format!(
-                "{} is not named: {}, and with every look counted it is {:.0} % sure",
-                name.class.join(" or "),
+                "not named: {}; {}, and with every look counted it is {:.0} % sure",
+                name.in_words(),
                 match looks::since(name, &rounds) {
                     1 => "no round was sure of it".to_owned(),
                     round => format!("it came up only in round {round}"),
@@ -169,8 +195,8 @@ pub enum Progress<'a> {
         /// The whole motion of the round, s.
         of: f64,
     },
-    /// The diagnosis of all recordings so far begins.
-    Diagnoses,
+    /// The diagnosis of all recordings so far is done to this part, 0 to 1.
+    Diagnoses(f64),
     /// The diagnosis says this.
     Said(&'a str),
     /// A step of the compensation begins.
@@ -195,20 +221,20 @@ pub fn settle(
     subject: &mut Subject,
     rig: &Rig,
     settings: &Settings,
-    mut progress: impl FnMut(Progress) -> Result<(), Error>,
+    mut progress: impl FnMut(Progress) -> Result<(), Error> + Send,
 ) -> Result<Settled, Error> {
     let limited = Limited::new(rig, subject.config()?)?;
     let mut run = Run { limited, rig, settings, request: Request::default() };
     let mut settled = Settled::default();
-    let last = run.rounds(subject, &mut settled, &mut progress)?;
-    if let Some(last) = last.filter(|_| !settled.names.is_empty()) {
-        let found = patched::patched(&last, &settled.names);
-        written_rig(&settings.out.join("patched-rig.toml"), &found)?;
-        if settings.compensate {
-            let radius_mm = run.limited.radius_mm();
-            settled.feel = Some(feel::feel(subject, &found, settings, radius_mm, &mut progress)?);
-        }
+    let outcome = run.all(subject, &mut settled, &mut progress);
+    if let (Err(error), false) = (&outcome, settled.rounds.is_empty()) {
+        let so_far = std::mem::take(&mut settled.conclusion);
+        let so_far = if so_far.is_empty() { so_far } else { format!("{so_far}; ") };
+        settled.conclusion = format!("{so_far}it ended early: {error}");
+        // The reason why it ended is the one to tell.
+        let _ = page::write(&settled, &settings.out);
     }
+    outcome?;
     page::write(&settled, &settings.out)?;
     Ok(settled)
 }
@@ -223,12 +249,31 @@ struct Run<'a> {
 }
 
 impl Run<'_> {
+    /// Plays the rounds, and feeds forward what they settled.
+    fn all(
+        &mut self,
+        subject: &mut Subject,
+        settled: &mut Settled,
+        progress: &mut (impl FnMut(Progress) -> Result<(), Error> + Send),
+    ) -> Result<(), Error> {
+        let last = self.rounds(subject, settled, progress)?;
+        let Some(last) = last.filter(|_| !settled.names.is_empty()) else { return Ok(()) };
+        let found = patched::patched(&last, &settled.names);
+        written_rig(&self.settings.out.join("patched-rig.toml"), &found)?;
+        if self.settings.compensate {
+            let wish = Wish { motion_s: MOST_MOTION_S - settled.motion_s(), ..Wish::default() };
+            let radius_mm = self.limited.radius_mm();
+            settled.feel = Some(feel::feel(subject, &found, self.settings, (radius_mm, wish), progress)?);
+        }
+        Ok(())
+    }
+
     /// Plays round after round until nothing is left to ask; returns the last diagnosis.
     fn rounds(
         &mut self,
         subject: &mut Subject,
         settled: &mut Settled,
-        progress: &mut impl FnMut(Progress) -> Result<(), Error>,
+        progress: &mut (impl FnMut(Progress) -> Result<(), Error> + Send),
     ) -> Result<Option<Outcome>, Error> {
         let mut asked = first(&self.limited, self.rig, self.settings)?;
         let mut last = None;
@@ -240,8 +285,8 @@ impl Run<'_> {
                 design.write(&folder.join("experiment")).map_err(Error::failed)?;
             }
             self.record(subject, &asked.programmes, &folder, progress)?;
-            progress(Progress::Diagnoses)?;
-            let outcome = match diagnosed(&self.request, &folder.join("report")) {
+            progress(Progress::Diagnoses(0.0))?;
+            let outcome = match diagnosed(&self.request, &folder.join("report"), progress) {
                 Ok(outcome) => outcome,
                 Err(error) if number == 1 => return Err(error),
                 Err(error) => {
@@ -312,7 +357,8 @@ fn written_rig(path: &Path, rig: &Rig) -> Result<(), Error> {
 fn first(limited: &Limited, rig: &Rig, settings: &Settings) -> Result<Asked, Error> {
     match settings.inputs {
         Inputs::Designed => {
-            limited.general("no recording yet: speeds, reversals and frequencies of every kind", GENERAL_S)
+            let why = "no recording yet: speeds, reversals and frequencies of every kind";
+            limited.general(why, GENERAL_S.min(0.5 * settings.motion_s))
         }
         Inputs::Multisines => limited.multisine(settings.seed, GENERAL_S.min(0.5 * settings.motion_s)),
         Inputs::Passive => limited.practice(0.5 * settings.motion_s),
@@ -335,8 +381,19 @@ fn shortened(mut all: Vec<Programme>, most_s: f64) -> Vec<Programme> {
     all
 }
 
-fn diagnosed(request: &Request, folder: &Path) -> Result<Outcome, Error> {
-    let outcome = diagnosis::diagnose(request, &|_, _| {}).map_err(Error::failed)?;
+fn diagnosed(
+    request: &Request,
+    folder: &Path,
+    progress: &mut (impl FnMut(Progress) -> Result<(), Error> + Send),
+) -> Result<Outcome, Error> {
+    // A diagnosis cannot be ended half-way: who stops is heard before the next movement.
+    let shared = Mutex::new(progress);
+    let shows = |_: &str, part: f64| {
+        if let Ok(mut progress) = shared.lock() {
+            let _ = progress(Progress::Diagnoses(part));
+        }
+    };
+    let outcome = diagnosis::diagnose(request, &shows).map_err(Error::failed)?;
     outcome.write(folder).map_err(|cause| {
         Error::failed(format_args!(
             "{}: the report cannot be written ({cause}); free some space or choose another --out",
@@ -348,10 +405,12 @@ fn diagnosed(request: &Request, folder: &Path) -> Result<Outcome, Error> {
 
 /// The round of a report; `before` are the names of the round before.
 fn round(asked: Asked, report: &Report, before: &[Name]) -> Round {
-    let name = |name: Option<diagnosis::effects::EffectName>| name.map_or("none", |name| name.as_str());
+    let name = |name: Option<EffectName>| name.map_or("none", |name| name.as_str());
     let contenders: Vec<(String, f64)> =
         report.contenders.iter().map(|c| (name(c.name).to_owned(), c.probability)).collect();
+    let rivals = asked.design.iter().flat_map(|design| &design.case.rivals);
     Round {
+        designed_against: rivals.map(|rival| rival.name.clone()).collect(),
         seconds: asked.programmes.iter().map(Programme::seconds).sum(),
         asked: asked.words,
         why: asked.why,

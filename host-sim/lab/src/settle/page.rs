@@ -1,6 +1,6 @@
 //! The inputs of each round and the reasons for them, as `settle.json` and a page.
 
-use super::{Feel, Name, Round, Settled};
+use super::{Feel, Name, Round, Settled, effect_in_words};
 use crate::compensate::felt::Felt;
 use device_sim::error::Error;
 use html_report::{Cell, Sheet};
@@ -62,6 +62,7 @@ fn feel_json(feel: &Result<Feel, String>) -> serde_json::Value {
         Ok(feel) => serde_json::json!({
             "before_mn_rms": phases(&feel.before),
             "after_mn_rms": phases(&feel.after),
+            "motion_s": feel.motion_s,
             "notes": feel.notes,
         }),
         Err(why) => serde_json::json!({ "why_not": why }),
@@ -72,7 +73,7 @@ fn html(settled: &Settled) -> String {
     let names: Vec<String> = settled
         .names
         .iter()
-        .map(|n| format!("{} ({:.0} % sure)", n.class.join(" or "), 100.0 * n.confidence))
+        .map(|n| format!("{} ({:.0} % sure)", n.in_words(), 100.0 * n.confidence))
         .collect();
     let named = if names.is_empty() {
         "Nothing is named".to_owned()
@@ -122,6 +123,7 @@ fn felt(sheet: &mut Sheet, feel: &Result<Feel, String>) {
     };
     let rows: Vec<Vec<Cell>> = phases.map(row).collect();
     sheet.table(&["phase", "before, mN rms", "after, mN rms"], &rows);
+    sheet.note(&format!("This took another {:.0} s of slow motion.", feel.motion_s));
     for note in &feel.notes {
         sheet.note(&format!("{}.", capitalised(note)));
     }
@@ -151,7 +153,7 @@ fn contenders(sheet: &mut Sheet, settled: &Settled) {
     if names.is_empty() {
         return;
     }
-    sheet.heading("Names that still contend, and their probability, %");
+    sheet.heading("Effects that still contend, and their probability, %");
     let head: Vec<String> =
         (1..=settled.rounds.len()).map(|number| format!("after round {number}")).collect();
     let head: Vec<&str> = std::iter::once("").chain(head.iter().map(String::as_str)).collect();
@@ -160,7 +162,8 @@ fn contenders(sheet: &mut Sheet, settled: &Settled) {
             let found = round.contenders.iter().find(|(other, _)| other == name);
             Cell::number(found.map(|(_, probability)| 100.0 * probability), 1)
         };
-        std::iter::once(Cell::text(*name)).chain(settled.rounds.iter().map(after)).collect()
+        let words = if *name == "none" { "no effect" } else { effect_in_words(name) };
+        std::iter::once(Cell::text(words)).chain(settled.rounds.iter().map(after)).collect()
     };
     let rows: Vec<Vec<Cell>> = names.iter().map(row).collect();
     sheet.table(&head, &rows);

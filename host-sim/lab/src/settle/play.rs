@@ -67,12 +67,13 @@ impl Limited {
     }
 
     /// A later round of some of everything, with other numbers: other speeds, faster reversals, and
-    /// twice the force.
-    pub(super) fn general_again(&self, why: &str, most_s: f64) -> Result<Asked, Error> {
-        let rad = |mm: f64| mm / self.radius_mm;
-        let frequencies = vec![6, 10, 16, 24, 36, 52, 75, 108, 151, 212, 289, 390];
+    /// twice the force, all of them `pace` times as much, 0.5 to 1.
+    pub(super) fn general_again(&self, why: &str, pace: f64, most_s: f64) -> Result<Asked, Error> {
+        let rad = |mm: f64| pace * mm / self.radius_mm;
+        let line = |hz: u16| (pace * f64::from(hz)).round() as u16;
+        let frequencies = [6, 10, 16, 24, 36, 52, 75, 108, 151, 212, 289, 390].map(line).to_vec();
         let signals = [
-            (Signal::Multisine { force: 2.0 * self.dry, frequencies }, 0.25),
+            (Signal::Multisine { force: 2.0 * pace * self.dry, frequencies }, 0.25),
             (Signal::Staircase { slowest: rad(8.0), ratio: 2.0, steps: 6, dwell_s: 0.5 }, 0.4),
             (Signal::Ladder { smallest: rad(0.1), ratio: 2.0, steps: 8, speed: rad(30.0) }, 0.35),
         ];
@@ -85,7 +86,7 @@ impl Limited {
         // A recording that travels nowhere is refused, so strokes precede the sines.
         let stroke = Signal::Triangle { stroke: 0.1 * travel, speed: 0.1 * speed };
         let strokes = Segment { signal: stroke, seconds: STROKES_S };
-        let limits = Limits { travel, speed, force };
+        let limits = Limits { travel, back: travel, speed, force };
         let sines = random_multisine(&limits, self.dry, seed, most_s - STROKES_S);
         self.of_input(&Input { segments: vec![strokes, sines] }, "a random multisine".into(), None)
     }
@@ -217,7 +218,8 @@ mod tests {
     #[test]
     fn what_is_not_designed_leaves_a_fifth_of_the_limits() {
         let limited = limited();
-        let rounds = [limited.general("", 12.0), limited.general_again("", 16.0), limited.practice(12.0)];
+        let rounds =
+            [limited.general("", 12.0), limited.general_again("", 1.0, 16.0), limited.practice(12.0)];
         for asked in rounds.into_iter().map(|asked| asked.expect("it is within the limits")) {
             for step in asked.programmes.iter().flat_map(|programme| &programme.steps) {
                 let (mm, mm_per_s, torque) = most(&step.excitation.signal);
