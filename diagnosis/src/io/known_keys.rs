@@ -1,6 +1,6 @@
 //! The keys of a rig file: one that is misspelt is named with the nearest that is known.
 
-/// Tables and their keys, as the contract has them.
+/// Tables and their keys, as docs/files.md has them.
 const KEYS: [(&str, &[&str]); 5] = [
     ("", &["format", "name", "kind", "model", "uncertainty", "actuator", "encoder", "effect"]),
     ("model", &["inertia", "viscous", "coulomb", "offset", "weight", "gravity", "gravity_zero"]),
@@ -61,6 +61,21 @@ pub(crate) fn unknown(rig: &toml::Table) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The example of the documentation has every key, and can be read.
+    #[test]
+    fn the_documented_rig_has_every_key() {
+        let page = include_str!("../../../docs/files.md");
+        let example = page.split("```").nth(1).and_then(|block| block.strip_prefix("toml"));
+        let rig = crate::rig::Rig::parse(example.expect("a rig"), "docs/files.md").expect("it can be read");
+        assert_eq!(rig.effects.len(), 1);
+        let table: toml::Table = example.expect("a rig").parse().expect("it is TOML");
+        for (name, keys) in KEYS {
+            let inside = if name.is_empty() { &table } else { table[name].as_table().expect("a table") };
+            let missing = keys.iter().find(|key| !inside.contains_key(**key));
+            assert_eq!(missing, None, "[{name}]");
+        }
+    }
 
     #[test]
     fn a_misspelt_or_misplaced_key_is_named_with_the_right_one() {

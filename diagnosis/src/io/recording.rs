@@ -36,7 +36,7 @@ fn foreign(header: &str) -> Option<String> {
     }
     let between = |mark: char, what: &str| {
         (header.contains(mark) && !header.contains(','))
-            .then(|| format!("fields stand between {what}; {by} commas and decimal points"))
+            .then(|| format!("fields are separated by {what}; {by} commas and decimal points"))
     };
     between(';', "semicolons").or_else(|| between('\t', "tabs"))
 }

@@ -66,9 +66,9 @@ pub(crate) fn assess(prepared: &Prepared, found: Found) -> Result<Assessment, Re
     let (unnamed, fitted) = unnamed.map_or((None, None), |(unnamed, fitted)| (Some(unnamed), fitted));
     let show = |fitted| Shown::new(&context, &holdout.smoothed, &weighed.estimator, &refit, fitted);
     let with_unnamed = fitted.map(show);
-    // A form that takes no material part off the error on recordings that it was not fitted to
-    // explains nothing.
-    let helps = with_unnamed.as_ref().is_none_or(|shown| is_material(&shown.table));
+    // A form that lowers no error on recordings it was not fitted to explains nothing.
+    let lowers = |shown: &Shown| shown.table.patched.holdout < shown.table.refit.holdout;
+    let helps = with_unnamed.as_ref().is_none_or(lowers);
     let (unnamed, with_unnamed) = if helps { (unnamed, with_unnamed) } else { (None, None) };
     let foreign = nothing_named.then(|| out_of_library::alone(&context, &refit, &holdout)).flatten();
     Ok(Assessment {

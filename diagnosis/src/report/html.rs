@@ -371,7 +371,7 @@ fn hypotheses(out: &mut String, outcome: &Outcome) {
     }
     out.push_str("</table></div><p class=note>Gain of log-likelihood on the held-out recordings over the model without it.</p>");
     if !r.untested.is_empty() {
-        out.push_str("<h3>Not tested</h3><p class=note>These recordings could not show them, so that they are not ruled out.</p><ul>");
+        out.push_str("<h3>Not tested</h3><p class=note>These recordings could not show them, so they are not ruled out.</p><ul>");
         for one in &r.untested {
             let _ = write!(
                 out,

@@ -172,7 +172,7 @@ pub(crate) fn free_run(out: &mut String, compared: &Comparison, wanted: &[&str])
     let motion = &compared.motion;
     let _ = write!(
         out,
-        "<details><summary>The free run of {:.1} s from the first row</summary><p class=note>It is a bad judge of a simulation: nothing \
+        "<details><summary>The free run of {:.1} s from the first row</summary><p class=note>It is a poor measure of a simulation: nothing \
          corrects it, so that an error of force adds up twice to one of position, and a tiny offset, or a start that is a little off, \
          counts for more than physics that is missing. A line that leaves the picture has diverged.</p>",
         motion.seconds()
@@ -251,7 +251,7 @@ pub(crate) fn scale(compared: &Comparison) -> (f64, String) {
 /// Writes the errors of each model as a table.
 pub(crate) fn table(out: &mut String, compared: &Comparison) {
     let (factor, unit) = scale(compared);
-    let _ = write!(out, "<div class=scroll><table><tr><th>position off, rms, {unit}</th>");
+    let _ = write!(out, "<div class=scroll><table><tr><th>position error, rms, {unit}</th>");
     for model in &compared.models {
         let _ = write!(out, "<th class=n>{}</th>", safe(&model.model));
     }

@@ -36,7 +36,9 @@ fn remains(report: &Report) -> String {
         return format!("{percent:.1} % of the force, on held-out recordings");
     };
     let means = match report.verdict {
-        _ if ratio < NOTHING => ": these recordings hold no more",
+        // The report shows the form of what repeats, however small it is.
+        Verdict::Unexplained => "",
+        _ if ratio < NOTHING => ": nothing more can be learnt from these recordings",
         _ if ratio < MORE => ": there is little more to be found in them",
         Verdict::MissingPhysics => {
             ": a further effect is missing, or the form of this one is not quite right"
@@ -54,7 +56,7 @@ fn record_next(report: &Report) -> String {
     }
     match report.verdict {
         Verdict::MissingPhysics => {
-            "nothing more is needed; to confirm, record another day at other speeds and loads"
+            "nothing more is needed; to confirm, record again on another day, at other speeds and loads"
         }
         Verdict::NoMismatch | Verdict::ParametersOnly => {
             "nothing; keep a recording of another day to hold out, as machines change"
@@ -95,7 +97,12 @@ mod tests {
         assert!(said(0.05 / 19.0).starts_with(
             "5.0 % of the force on held-out recordings, 19 times the sensor's noise: a further"
         ));
-        assert!(said(0.05 / 1.1).ends_with("1.1 times the sensor's noise: these recordings hold no more"));
+        assert!(
+            said(0.05 / 1.1)
+                .ends_with("1.1 times the sensor's noise: nothing more can be learnt from these recordings")
+        );
+        let repeats = report(Verdict::Unexplained, 0.05 / 1.1).remains;
+        assert!(repeats.ends_with("1.1 times the sensor's noise"), "{repeats}: the form is in the report");
         assert!(!said(0.0).contains("noise"), "a sensor without noise is no yardstick");
     }
 

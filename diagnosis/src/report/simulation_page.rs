@@ -147,7 +147,7 @@ mod tests {
             "<b>Warning:</b> a note.",
             "<h3>Position in windows of 0.5 s</h3>",
             "<h3>How far off it is</h3>",
-            "position off, rms",
+            "position error, rms",
             "<details><summary>The free run of 10.0 s",
             "<h3>Position</h3>",
             "<h3>Speed</h3>",

@@ -63,7 +63,7 @@ pub(crate) fn rejection(why: &Rejection) -> String {
             format!("it is right with a probability of only {probability:.2}: {}", weakness(weakest))
         }
         Rejection::Indistinguishable { from } => format!("the recordings cannot tell it from {from}"),
-        Rejection::LessInSearch => "in the search others explain more".into(),
+        Rejection::LessInSearch => "not fitted in full: other effects explained more in the search".into(),
         Rejection::Behind { winner, z } => format!("{winner} explains more by {z:.1} standard errors"),
     }
 }

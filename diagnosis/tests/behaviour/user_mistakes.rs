@@ -221,9 +221,9 @@ const MISTAKES: [(&str, &str, &str, &str); 10] = [
         "rig.toml",
         "semicolons.csv",
         "holdout.csv",
-        "semicolons.csv, line 1: fields stand between semicolons; let host-sim import read the file",
+        "semicolons.csv, line 1: fields are separated by semicolons; let host-sim import read the file",
     ),
-    ("rig.toml", "tabs.csv", "holdout.csv", "tabs.csv, line 1: fields stand between tabs"),
+    ("rig.toml", "tabs.csv", "holdout.csv", "tabs.csv, line 1: fields are separated by tabs"),
     (
         "rig.toml",
         "commented.csv",

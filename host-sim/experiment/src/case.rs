@@ -130,7 +130,7 @@ fn report(folder: &Path) -> Result<Report, String> {
         )
     })?;
     serde_json::from_str(&text)
-        .map_err(|cause| format!("{}: this is no report ({cause}); diagnose again", path.display()))
+        .map_err(|cause| format!("{}: this is not a report ({cause}); diagnose again", path.display()))
 }
 
 fn rivals(folder: &Path, report: &Report) -> Result<Vec<Rival>, String> {
@@ -151,7 +151,7 @@ fn rivals(folder: &Path, report: &Report) -> Result<Vec<Rival>, String> {
     Case::normalise(&mut rivals);
     if rivals.len() < 2 {
         return Err(format!(
-            "{}: no two models contend for a name, so there is nothing to distinguish; the report's own sentence holds",
+            "{}: no two models contend for a name, so there is nothing to distinguish; the verdict of the report is final",
             folder.join("diagnosis.json").display()
         ));
     }

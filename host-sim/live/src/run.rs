@@ -338,7 +338,7 @@ fn address(text: &str) -> Result<SocketAddr, String> {
     let without = || Some(SocketAddr::new(text.parse::<IpAddr>().ok()?, PORT));
     with_port()
         .or_else(without)
-        .ok_or_else(|| "it is no address such as 0.0.0.0 or 192.168.1.20:8710".to_owned())
+        .ok_or_else(|| "it is not an address such as 0.0.0.0 or 192.168.1.20:8710".to_owned())
 }
 
 /// Serves the page, with the debrief of what is recorded in the page.

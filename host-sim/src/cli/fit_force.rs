@@ -22,7 +22,7 @@ pub(crate) struct FitForce {
     /// Recordings to judge by, which the fit does not see
     #[arg(long, value_name = "FILE")]
     holdout: Vec<PathBuf>,
-    /// The table; the page is written beside it, with .html at its end
+    /// The table; the page gets the same name with .html
     #[arg(long, value_name = "F.toml")]
     out: PathBuf,
 }

@@ -94,7 +94,7 @@ fn pandas_numpy_matlab_and_json_give_the_same_motion() {
             1.0,
             &["read as MATLAB: 4 columns"],
         ),
-        ("rows.csv", &[], 1.0, &["channels stand in rows, 3 of 500 values: taken as columns"]),
+        ("rows.csv", &[], 1.0, &["channels are in rows, 3 of 500 values: taken as columns"]),
         (
             "matrix.json",
             &["--column", "time=0:s", "--column", "position=1:rad", "--column", "command=2:Nm"],

@@ -95,7 +95,7 @@ fn a_column_that_only_a_person_knows_is_asked_with_its_option() {
 }
 
 #[cfg(feature = "hdf5")]
-const UNREAD_HDF5: &str = "is no usable HDF5 file";
+const UNREAD_HDF5: &str = "is not a usable HDF5 file";
 #[cfg(not(feature = "hdf5"))]
 const UNREAD_HDF5: &str = "save('FILE.mat', '-v7')";
 
@@ -118,7 +118,11 @@ fn columns_of_one_name_are_told_apart_by_their_numbers() {
 fn a_file_that_holds_no_usable_table_is_refused() {
     let out = &folder("import-unusable");
     let cases: Vec<Refused> = vec![
-        (written(out, "g.mat", b"MATLAB 5.0 MAT-file, Platform: GLNXA64"), &[], "is no usable MATLAB file"),
+        (
+            written(out, "g.mat", b"MATLAB 5.0 MAT-file, Platform: GLNXA64"),
+            &[],
+            "is not a usable MATLAB file",
+        ),
         (written(out, "v73.mat", b"MATLAB 7.3 MAT-file"), &[], UNREAD_HDF5),
         (written(out, "v4.mat", b"\0\0\0\0\x01\0\0\0"), &[], "is a MATLAB 4 file; save it again"),
         (foreign("sheet.xlsx"), &[], "is an Excel workbook; save its sheet as CSV"),
@@ -128,7 +132,7 @@ fn a_file_that_holds_no_usable_table_is_refused() {
             "--undriven where nothing drives the axis; and the position column theta",
         ),
         (written(out, "h.csv", b"nothing here\nbut words\n"), &[], "no row of numbers was found"),
-        (written(out, "i.npz", b"PK\x03\x04 q.npy and no more"), &[], "is no usable NumPy file"),
+        (written(out, "i.npz", b"PK\x03\x04 q.npy and no more"), &[], "is not a usable NumPy file"),
     ];
     assert_refused(out, cases);
 }

@@ -16,7 +16,7 @@ const MOST_PER_BYTE: u64 = 1032;
 /// one.
 pub(super) fn read(file: &str, bytes: Vec<u8>) -> Result<Log, Error> {
     let unusable = |cause: &dyn std::fmt::Display| {
-        Error::input(format_args!("{file}: is no usable HDF5 file ({cause}); write it again"))
+        Error::input(format_args!("{file}: is not a usable HDF5 file ({cause}); write it again"))
     };
     let is_matlab = bytes.starts_with(b"MATLAB");
     let most = bytes.len() as u64 * MOST_PER_BYTE;

@@ -26,7 +26,7 @@ struct Topic {
 
 pub(super) fn read(file: &str, bytes: &[u8]) -> Result<Log, Error> {
     let unusable = |cause: &dyn std::fmt::Display| {
-        Error::input(format_args!("{file}: is no usable MCAP recording ({cause}); record it again"))
+        Error::input(format_args!("{file}: is not a usable MCAP recording ({cause}); record it again"))
     };
     let mut found = Found::default();
     let mut notes = Vec::new();

@@ -21,7 +21,7 @@ const NUMBERS: std::ops::RangeInclusive<u8> = 6..=15;
 pub(super) fn read(file: &str, bytes: &[u8]) -> Result<Log, Error> {
     let unusable = |cause: &str| {
         Error::input(format_args!(
-            "{file}: is no usable MATLAB file ({cause}); save it again with save('FILE.mat', '-v7')"
+            "{file}: is not a usable MATLAB file ({cause}); save it again with save('FILE.mat', '-v7')"
         ))
     };
     let little = match bytes.get(126..HEADER) {

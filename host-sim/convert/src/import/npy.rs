@@ -11,7 +11,9 @@ const FIRST: usize = 0;
 
 pub(super) fn read(file: &str, bytes: Vec<u8>) -> Result<Log, Error> {
     let unusable = |cause: &dyn std::fmt::Display| {
-        Error::input(format_args!("{file}: is no usable NumPy file ({cause}); write it again with np.savez"))
+        Error::input(format_args!(
+            "{file}: is not a usable NumPy file ({cause}); write it again with np.savez"
+        ))
     };
     let mut columns = Vec::new();
     let mut left_out = Vec::new();

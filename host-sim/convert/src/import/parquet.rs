@@ -17,7 +17,7 @@ const WIDEST: usize = 64;
 pub(super) fn read(file: &str, bytes: Vec<u8>) -> Result<Log, Error> {
     let unusable = |cause: parquet::errors::ParquetError| {
         Error::input(format_args!(
-            "{file}: is no usable Parquet file ({cause}); write it again, with no compression or snappy"
+            "{file}: is not a usable Parquet file ({cause}); write it again, with no compression or snappy"
         ))
     };
     let reader = SerializedFileReader::new(bytes::Bytes::from(bytes)).map_err(unusable)?;

@@ -104,7 +104,7 @@ pub fn choice(text: &str) -> Result<Choice, Error> {
     let Some(role) = Role::ALL.into_iter().find(|known| known.name() == role.trim()) else {
         let known: Vec<&str> = Role::ALL.iter().map(|r| r.name()).collect();
         return Err(Error::input(format_args!(
-            "--column {text}: \"{role}\" is no role; use one of {}",
+            "--column {text}: \"{role}\" is not a role; use one of {}",
             known.join(", ")
         )));
     };
@@ -388,7 +388,7 @@ fn nowhere(files: &[&str], choice: &Choice, logs: &[Log]) -> Error {
     let name = choice.name.trim_start_matches('-');
     let unit = match name.rsplit_once(':') {
         Some((_, unit)) => format!(
-            ", or {unit} is no unit (units are s, ms, us, ns, rad, deg, rev, counts, m, mm, rad/s, deg/s, rpm, m/s, mm/s, A, mA, V, Nm, mNm, N, dac)"
+            ", or {unit} is not a unit (units are s, ms, us, ns, rad, deg, rev, counts, m, mm, rad/s, deg/s, rpm, m/s, mm/s, A, mA, V, Nm, mNm, N, dac)"
         ),
         None => String::new(),
     };

@@ -236,7 +236,7 @@ fn channels_in_rows(file: &str, lines: &[(usize, &str)], separator: char, count:
     }
     (columns.len() >= 2).then(|| {
         let note = format!(
-            "read as text: channels stand in rows, {} of {} values: taken as columns",
+            "read as text: channels are in rows, {} of {} values: taken as columns",
             columns.len(),
             columns[0].values.len()
         );

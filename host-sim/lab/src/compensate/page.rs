@@ -10,7 +10,7 @@ use html_report::{Cell, Sheet, decimal};
 pub fn html(outcome: &Outcome) -> String {
     let (before, after) = (&outcome.before, &outcome.after);
     let not_kept =
-        if outcome.is_compensated { "" } else { " Nothing of it helped: the device is as it was before." };
+        if outcome.is_compensated { "" } else { " No part of it helped: the device is as it was before." };
     let lead = format!(
         "Of the mechanism's own forces a hand would have felt {} mN and feels {} mN now (root mean square over insertion, hold and \
          withdrawal at 10 mm/s; the device's servo stood in for the hand).{not_kept}",

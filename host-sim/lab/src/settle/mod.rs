@@ -389,7 +389,8 @@ fn diagnosed(
     // A diagnosis cannot be ended half-way: who stops is heard before the next movement.
     let shared = Mutex::new(progress);
     let shows = |_: &str, part: f64| {
-        if let Ok(mut progress) = shared.lock() {
+        // Its beginning has been told.
+        if let Some(mut progress) = shared.lock().ok().filter(|_| part > 0.0) {
             let _ = progress(Progress::Diagnoses(part));
         }
     };

@@ -89,7 +89,7 @@ impl FromStr for Spec {
         let (name, address) = text.split_once('=').map_or((text, None), |(name, at)| (name, Some(at)));
         let Some((kind, ..)) = Kind::ALL.iter().find(|(_, known, _)| *known == name) else {
             let names: Vec<_> = Kind::ALL.iter().map(|(_, name, _)| *name).collect();
-            return Err(format!("`{name}` is no stream; there are {}", names.join(", ")));
+            return Err(format!("`{name}` is not a stream; there are {}", names.join(", ")));
         };
         let usual = Self::of(*kind);
         let Some(address) = address else { return Ok(usual) };
