@@ -247,3 +247,30 @@ fn a_stop_while_feeding_forward_gives_back_what_the_device_had() {
     assert!(steps.len() >= 3, "{steps:?}");
     assert_eq!(*device.lock().expect("nobody panicked").plan().device(), before);
 }
+
+/// Takes 10 s: a round has to be recorded and diagnosed before a person can end the next one.
+#[test]
+fn a_run_that_is_ended_keeps_its_rounds() {
+    let out = folder("settle-kept");
+    let rig = Rig::parse(LATE, "lag.toml").expect("a rig");
+    let mut subject = Subject::Virtual(Box::new(Plant { rig, file: "lag.toml".into() }));
+    let rig = subject.data_sheet_rig().expect("the virtual device has a data sheet");
+    let settings = Settings { rounds: 5, compensate: false, ..settings(&out, 38.0, true) };
+    let mut parts = Vec::new();
+    let ended = settle(&mut subject, &rig, &settings, |progress| match progress {
+        Progress::Asked(2, ..) => Err(Error::failed("not again")),
+        Progress::Diagnoses(part) => {
+            parts.push(part);
+            Ok(())
+        }
+        _ => Ok(()),
+    });
+    assert_eq!(ended.expect_err("it was ended").to_string(), "not again");
+    let json = std::fs::read_to_string(out.join("settle.json")).expect("it was written");
+    let json: serde_json::Value = serde_json::from_str(&json).expect("JSON");
+    assert_eq!(json["rounds"].as_array().map(Vec::len), Some(1));
+    let conclusion = json["conclusion"].as_str().expect("a sentence");
+    assert!(conclusion.contains("it ended early: not again"), "{conclusion}");
+    assert!(out.join("settle.html").is_file());
+    assert!(parts.len() > 5 && parts.is_sorted(), "progress never falls: {parts:?}");
+}
