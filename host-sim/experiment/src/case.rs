@@ -13,7 +13,7 @@ const LEAST_PROBABILITY: f64 = 0.01;
 const FEWEST_STEPS: f64 = 20.0;
 /// Least probability of a contender that the report names as the possible truth of a named effect.
 const LEAST_OF_CLASS: f64 = 0.05;
-/// Part of the way ahead that an input may go behind its begin where no recording did: a servo that
+/// Part of the way ahead that an input may go behind its start where no recording did: a servo that
 /// returns there overshoots.
 const LEAST_BACK: f64 = 0.02;
 /// The most contenders that are compared.
@@ -92,6 +92,12 @@ impl Case {
                 folder.display()
             )
         })?;
+        if travel.is_none() && shown.ahead <= 0.0 {
+            return Err(format!(
+                "{}: no recording goes ahead of where it began, where an input moves; give the room ahead with --travel",
+                folder.display()
+            ));
+        }
         // Where only recordings tell, an input stays where they were: it may begin at a stop.
         let limits = Limits {
             travel: travel.unwrap_or(shown.ahead),

@@ -275,7 +275,10 @@ struct Limit {
 fn words(case: &Case) -> Limit {
     let (kind, limits) = (case.rivals[0].rig.kind, &case.limits);
     Limit {
-        travel: format!("{} {}", crate::input::short(limits.travel), kind.length()),
+        travel: match (crate::input::short(limits.travel), crate::input::short(limits.back)) {
+            (travel, back) if travel == back => format!("{travel} {}", kind.length()),
+            (travel, back) => format!("{travel} {} ahead, {back} back", kind.length()),
+        },
         speed: format!("{} {}/s", crate::input::short(limits.speed), kind.length()),
         force: format!("{} {}", crate::input::short(limits.force), kind.force()),
     }

@@ -82,6 +82,24 @@ fn a_weight_that_the_report_does_not_have_is_measured() {
 }
 
 #[test]
+fn no_part_is_tried_without_beyond_the_motion_allowed() {
+    let mut wrong = rig("hidden-found.toml");
+    // hidden.toml has no offset, so that not all of it helps.
+    wrong.model.offset = Some(1.0e-3);
+    let (mut line, mut steps) = (line(rig_hidden()), Vec::new());
+    let wish = Wish { motion_s: 50.0, ..Wish::default() };
+    let outcome = compensate::compensate(&mut line, &wrong, wish, |step| {
+        steps.push(step.to_string());
+        Ok(())
+    })
+    .expect("it ends well");
+    assert!(outcome.motion_s <= 50.0, "{} s", outcome.motion_s);
+    assert_eq!(steps.len(), 3, "tilt, before and after: {steps:?}");
+    assert!(!outcome.is_compensated);
+    assert!(outcome.taken_back[0].contains("the motion allowed"), "{:?}", outcome.taken_back);
+}
+
+#[test]
 fn parts_that_the_hand_feels_more_are_undone() {
     let mut wrong = rig("hidden-found.toml");
     // hidden.toml has no offset.

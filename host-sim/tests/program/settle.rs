@@ -67,14 +67,20 @@ name = "electrical_lag"
 shape = { time_constant = 0.0002 }
 "#;
 
+/// The virtual device with that lag, and the rig of its data sheet.
+fn late() -> (Subject<'static>, Rig) {
+    let rig = Rig::parse(LATE, "lag.toml").expect("a rig");
+    let mut subject = Subject::Virtual(Box::new(Plant { rig, file: "lag.toml".into() }));
+    let rig = subject.data_sheet_rig().expect("the virtual device has a data sheet");
+    (subject, rig)
+}
+
 /// 38 s of motion at 10 kHz and two diagnoses take some 15 s: fewer would not show a round that is
 /// designed against the one before.
 #[test]
 fn a_class_is_asked_again_within_the_motion_allowed() {
     let out = folder("settle-designed");
-    let rig = Rig::parse(LATE, "lag.toml").expect("a rig");
-    let mut subject = Subject::Virtual(Box::new(Plant { rig, file: "lag.toml".into() }));
-    let rig = subject.data_sheet_rig().expect("the virtual device has a data sheet");
+    let (mut subject, rig) = late();
     let settings = Settings { rounds: 5, motion_s: 38.0, compensate: false, ..settings(&out, 0.0, true) };
     let mut asked = Vec::new();
     let settled = settle(&mut subject, &rig, &settings, |progress| {
@@ -252,9 +258,7 @@ fn a_stop_while_feeding_forward_gives_back_what_the_device_had() {
 #[test]
 fn a_run_that_is_ended_keeps_its_rounds() {
     let out = folder("settle-kept");
-    let rig = Rig::parse(LATE, "lag.toml").expect("a rig");
-    let mut subject = Subject::Virtual(Box::new(Plant { rig, file: "lag.toml".into() }));
-    let rig = subject.data_sheet_rig().expect("the virtual device has a data sheet");
+    let (mut subject, rig) = late();
     let settings = Settings { rounds: 5, compensate: false, ..settings(&out, 38.0, true) };
     let mut parts = Vec::new();
     let ended = settle(&mut subject, &rig, &settings, |progress| match progress {

@@ -101,7 +101,7 @@ impl Outcome {
 pub struct Wish {
     /// The gains, as a share of the most that is usual, 0 to 1.
     pub share: f64,
-    /// No part is tried without once this much motion is over, s.
+    /// The most motion for trials without one part, with all that came before them, s.
     pub motion_s: f64,
 }
 
@@ -233,6 +233,8 @@ impl<A: AsyncFnMut(Step) -> Result<(), Error>> Work<'_, '_, A> {
         before: &Felt,
         angle: Option<angle::Angle>,
     ) -> Result<(Option<Trial>, Vec<String>), Error> {
+        let (turns, hold) = excitations(self.found.inertia, full.roller_radius.0.to_num(), true);
+        let trial_s = f64::from(turns.duration_ms + hold.duration_ms) * 1e-3;
         let mut taken_back = Vec::new();
         let mut kept = self.try_it(full, angle, Step::After).await?;
         while excess(before, &kept.felt) > 0.0 {
@@ -241,8 +243,11 @@ impl<A: AsyncFnMut(Step) -> Result<(), Error>> Work<'_, '_, A> {
             let parts: Vec<Part> =
                 fed(&kept.device).into_iter().filter(|(_, is_fed)| *is_fed).map(|(part, _)| part).collect();
             // Without its last part it is the device as it was.
-            let may_try = parts.len() > 1 && self.bench.played_s() < self.wish.motion_s;
-            for part in parts.iter().copied().filter(|_| may_try) {
+            for part in parts.iter().copied().filter(|_| parts.len() > 1) {
+                if self.bench.played_s() + trial_s > self.wish.motion_s {
+                    taken_back.push("the motion allowed does not suffice to try without each part".into());
+                    break;
+                }
                 let mut device = kept.device;
                 *part.gain(&mut device.compensation.gains) = Gain(0);
                 let trial = self.try_it(&device, angle, Step::Without(part)).await?;

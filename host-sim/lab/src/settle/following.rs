@@ -64,10 +64,10 @@ fn not_distinguished(settled: &Settled) -> Option<String> {
                 && round.names.iter().any(|name| has_members(&name.class, class))
         })
     };
-    let class = first.names.iter().map(|name| &name.class).find(|class| class.len() > 1 && is_same(class))?;
+    let name = first.names.iter().find(|name| name.class.len() > 1 && is_same(&name.class))?;
     Some(format!(
-        "{DESIGNED_AGAINST} inputs that were designed to distinguish {} did not",
-        class.join(" from ")
+        "{DESIGNED_AGAINST} inputs that were designed to decide between {} did not",
+        name.in_words()
     ))
 }
 

@@ -1,6 +1,6 @@
 //! `settle`: a device records, diagnoses, designs the experiment that distinguishes the remaining
-//! rivals, and records again, until one name is left or nothing tells the rest apart. What was
-//! settled is fed forward by the device, as far as it can be.
+//! rivals, and records again, until one name is left or nothing distinguishes the rest. What
+//! was settled is fed forward by the device, as far as it can be.
 
 mod feel;
 mod following;
