@@ -28,7 +28,8 @@ pub struct Plant {
 }
 
 impl Plant {
-    /// A plant at rest at position zero.
+    /// A plant at rest at position zero. Before the first step the command is taken to have stood
+    /// still.
     pub fn new(rig: &Rig) -> Self {
         let of_effects = rig.effects.iter().filter_map(CommandLaw::new);
         let commands = rig.known_command_laws().into_iter().chain(of_effects).collect();
@@ -53,6 +54,15 @@ impl Plant {
             lag: 0.0,
             sensor: 0.0,
         }
+    }
+
+    /// The same, but its drive got a command of zero before the first step.
+    pub fn unpowered(rig: &Rig) -> Self {
+        let mut plant = Self::new(rig);
+        plant.commands.iter_mut().for_each(|law| {
+            law.step(0.0, 0.0);
+        });
+        plant
     }
 
     /// One step of `dt` s with `command` held.

@@ -90,7 +90,7 @@ struct Along {
 }
 
 fn along(rig: &Rig, motion: &Prediction, rows: usize) -> Along {
-    let mut plant = Plant::new(rig);
+    let mut plant = Plant::unpowered(rig);
     let blocks = motion.position.len() / rows;
     let mut out = Along { acceleration: Vec::with_capacity(blocks), reading: Vec::with_capacity(blocks) };
     for block in 0..blocks {

@@ -23,7 +23,7 @@ pub struct Prediction {
 impl Prediction {
     /// Simulates a rival under an input and the servo; the force is limited to `limits`.
     pub fn new(rival: &Rival, input: &Input, servo: Servo, limits: &Limits) -> Self {
-        let mut plant = Plant::new(&rival.rig);
+        let mut plant = Plant::unpowered(&rival.rig);
         let gain = rival.rig.actuator.gain;
         let mut out = Self::default();
         // From segment to segment the reference goes on from where it is, as on the device.

@@ -3,6 +3,8 @@
 use diagnosis::effects::{Effect, EffectName};
 use diagnosis::rig::Rig;
 use experiment::{Case, Limits, Rival, Signal, design};
+use std::collections::BTreeMap;
+use std::path::PathBuf;
 
 /// A bare roller of a small motor.
 fn rig(effects: Vec<Effect>) -> Rig {
@@ -137,4 +139,54 @@ fn what_may_not_move_decides_nothing() {
     case.limits.travel = 1e-6;
     let design = design(&case, 12.0, 1).expect("holding still is within every limit");
     assert!(!design.decides() && design.tried.1 > 0);
+}
+
+/// The columns of a CSV file by its header.
+fn columns(text: &str) -> BTreeMap<String, Vec<f64>> {
+    let mut lines = text.lines();
+    let header: Vec<&str> = lines.next().expect("a header").split(',').collect();
+    let rows: Vec<Vec<f64>> =
+        lines.map(|line| line.split(',').map(|cell| cell.parse().expect("a number")).collect()).collect();
+    let column = |at: usize| rows.iter().map(|row| row[at]).collect();
+    header.iter().enumerate().map(|(at, name)| ((*name).to_owned(), column(at))).collect()
+}
+
+/// The files as another machine gets them: the command, played without our plant by a roller with
+/// inertia and viscous friction whose command comes 2 ms late, gives the motion that was predicted,
+/// and the reference is one that the limits allow.
+#[test]
+fn the_files_give_another_machine_the_predicted_motion() {
+    let mut case = delay_or_lag();
+    case.rivals.iter_mut().for_each(|rival| rival.rig.model.coulomb = Some(0.0));
+    let design = design(&case, 9.0, 1).expect("the limits are wide");
+    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("experiment-files");
+    let files = design.write(&folder).expect("there is space");
+    assert!(files.iter().all(|file| file.is_file()), "{files:?}");
+    let read = |name: &str| columns(&std::fs::read_to_string(folder.join(name)).expect("it was written"));
+    let (command, reference, predicted) = (read("command.csv"), read("reference.csv"), read("predicted.csv"));
+    let rows = (design.chosen.input.seconds() * 1e4).round() as usize;
+    for file in [&command, &reference] {
+        let time = &file["time_s"];
+        assert_eq!(time.len(), rows);
+        assert!(time.iter().enumerate().all(|(row, time)| (time - 1e-4 * row as f64).abs() < 1e-9));
+    }
+    assert!(reference["reference"].iter().all(|place| place.abs() <= 0.8 * case.limits.travel));
+    assert!(reference["force"].iter().all(|force| force.abs() <= 0.8 * case.limits.force));
+    let (inertia, viscous, gain, late) = (1.2e-6, 1e-6, 1e-5, 20);
+    let (mut place, mut speed, mut apart) = (0.0_f64, 0.0_f64, 0.0_f64);
+    let mut farthest = 0.0_f64;
+    for row in 0..rows {
+        if row % 10 == 0 {
+            let said = predicted["command_delay_position"][row / 10];
+            apart = apart.max((said - place).abs());
+            farthest = farthest.max(said.abs());
+        }
+        let force = if row < late { 0.0 } else { gain * command["command"][row - late] };
+        // J·dv/dt = F − b·v, to the letter for a constant force.
+        let (last, decay) = (force / viscous, (-viscous * 1e-4 / inertia).exp());
+        place += last * 1e-4 + (speed - last) * (1.0 - decay) * inertia / viscous;
+        speed = last + (speed - last) * decay;
+    }
+    assert!(farthest > 1.0, "it moves by {farthest} rad");
+    assert!(apart < 1e-3 * farthest, "{apart} rad of {farthest} rad");
 }

@@ -7,6 +7,7 @@ use control_core::units::{Damping, Millimetres, MillimetresPerSecond, Millinewto
 use fixed::types::{I8F24, I16F16};
 use link::Command;
 use link::codec::{self, MAX_FRAME};
+use link::device::LATE_TICKS;
 use link::frames::{CommandRefusal, HostFrame};
 use tests::board::{Board, MILLISECOND, Nanos, Wiring};
 use tests::pc;
@@ -170,6 +171,25 @@ fn a_sequence_stops_at_once_and_nothing_of_it_is_left() {
     assert_eq!(pc.must_not(&mut board, play.clone()), CommandRefusal::Sequence(SequenceRefusal::Nothing));
     pc.run_ms(&mut board, 100);
     assert!(!board.at_stop(|stopped| stopped.drive().enabled), "a new session starts no torque");
+}
+
+/// Takes as long as the image runs for the ten seconds after which a sequence is forgotten.
+#[test]
+fn a_late_sequence_is_refused_and_forgotten() {
+    let Rig { mut board, mut pc } = Rig::zeroed(Wiring::default());
+    let commands = pc::sequence(&three_segments());
+    let (play, upload) = commands.split_last().expect("a command to play");
+    upload.iter().for_each(|segment| pc.must(&mut board, segment.clone()));
+    pc.run_ms(&mut board, LATE_TICKS / 10 + 1);
+    let late = CommandRefusal::Sequence(SequenceRefusal::Late);
+    assert_eq!(pc.must_not(&mut board, play.clone()), late);
+    let nothing = CommandRefusal::Sequence(SequenceRefusal::Nothing);
+    assert_eq!(pc.must_not(&mut board, play.clone()), nothing, "the late one is forgotten");
+    assert!(!has_given_torque(&mut board), "a late sequence gave torque");
+    // The same, uploaded anew.
+    commands.iter().for_each(|command| pc.must(&mut board, command.clone()));
+    pc.run_ms(&mut board, 50);
+    assert!(board.at_stop(|stopped| stopped.drive().enabled), "it plays");
 }
 
 #[test]

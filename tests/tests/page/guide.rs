@@ -1,14 +1,19 @@
-//! The guide in the page: `commission --page` asks before each step and shows what came of it;
-//! `compensate`'s gains are changed in the page while a hand feels them.
+//! The guide in the page: `commission --page` and `settle --page` ask before each step and show
+//! what came of it; `compensate`'s gains are changed in the page while a hand feels them.
 
 use std::fs;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
-use tests::browser::{Chromium, Error, Page, Places, Program};
+use tests::browser::{Chromium, Error, Page, Places, Program, check};
 
 /// A start on a busy machine.
 const SOME_TIME: Duration = Duration::from_secs(60);
 /// Steps of commissioning.
 const STEPS: usize = 5;
+/// A step waits for its press.
+const ASKED: &str = "document.querySelector('.step[data-stage=asked]') !== null";
+/// The program has said what came of it all.
+const ENDED: &str = "!document.getElementById('end').hidden";
 /// A device's part with a weight that is compensated.
 const COMPENSATED: &str = r#"
 format = 1
@@ -71,6 +76,89 @@ fn commission() -> Result<(), Error> {
     }
     page.click("leave")?;
     program.ended(SOME_TIME)
+}
+
+/// Takes some 20 s: a round is simulated and diagnosed, and its outcome is fed forward.
+#[test]
+fn settling_asks_before_each_movement_and_shows_what_it_found() {
+    if let Err(error) = settle() {
+        panic!("{error}");
+    }
+}
+
+fn settle() -> Result<(), Error> {
+    let places = Places::find()?;
+    let scratch = places.scratch("page-settle")?;
+    let browser = Chromium::start(&scratch)?;
+    let plant = concat!(env!("CARGO_MANIFEST_DIR"), "/fixtures/hidden.toml");
+    let out = empty(&scratch, "settled")?;
+    let folder = out.to_str().ok_or("the target folder has a plain name")?;
+    let settle = ["settle", "--page", "--port", "0", "--plant", plant, "--out", folder];
+    let one_round = ["--rounds", "1", "--motion", "40", "--inputs", "characterise"];
+    let mut program = Program::start_with(&places.program, &[&settle[..], &one_round].concat())?;
+    let mut page = Page::open(&browser, &program.url, 390, 844, true)?;
+    page.wait("the first round", SOME_TIME, ASKED)?;
+    let first = page.text("document.querySelector('.step .text').textContent")?;
+    check("the page says what is asked and why", first.contains("round 1") && first.contains("why"), &first)?;
+    check("nothing is played before the press", !out.join("round-1").exists(), &out)?;
+    page.evaluate("window.said = new Set(); new MutationObserver(() => document.querySelectorAll('.going, .news').forEach((one) => said.add(one.textContent))).observe(document.getElementById('steps'), { subtree: true, childList: true, characterData: true })")?;
+    let mut steps = 0;
+    loop {
+        page.wait("a step or the end", SOME_TIME, &format!("{ASKED} || {ENDED}"))?;
+        if page.evaluate(ENDED)?.as_bool() == Some(true) {
+            break;
+        }
+        steps += 1;
+        page.evaluate("document.querySelector('.step[data-stage=asked] .begin').click()")?;
+        page.wait("the step begins", SOME_TIME, &format!("!({ASKED}) || {ENDED}"))?;
+    }
+    page.photograph(&scratch.join("settled.png"))?;
+    check("a round and the steps of feeding forward", steps >= 3, steps)?;
+    let said = page.text("[...said].join(' ')")?;
+    check("the page shows what goes on", said.contains("s played") && said.contains("% done"), &said)?;
+    let end = page.text("document.getElementById('end').innerText")?;
+    let found = fs::read_to_string(out.join("settle.json")).map_err(|e| e.to_string())?;
+    let found: serde_json::Value = serde_json::from_str(&found).map_err(|e| e.to_string())?;
+    let conclusion = found["conclusion"].as_str().ok_or("a conclusion")?;
+    check("the page ends with the conclusion", end.contains(conclusion), (&end, conclusion))?;
+    page.click("leave")?;
+    program.ended(SOME_TIME)
+}
+
+/// A folder that is not there yet, whatever an earlier run of the test left.
+fn empty(scratch: &Path, name: &str) -> Result<PathBuf, Error> {
+    let folder = scratch.join(name);
+    if folder.exists() {
+        fs::remove_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
+    }
+    Ok(folder)
+}
+
+#[test]
+fn leaving_the_page_ends_settling_before_anything_moves() {
+    if let Err(error) = leave_settling() {
+        panic!("{error}");
+    }
+}
+
+fn leave_settling() -> Result<(), Error> {
+    let places = Places::find()?;
+    let scratch = places.scratch("page-settle-left")?;
+    let browser = Chromium::start(&scratch)?;
+    let plant = concat!(env!("CARGO_MANIFEST_DIR"), "/fixtures/hidden.toml");
+    let out = empty(&scratch, "settled")?;
+    let folder = out.to_str().ok_or("the target folder has a plain name")?;
+    let settle = ["settle", "--page", "--port", "0", "--plant", plant, "--out", folder];
+    let mut program = Program::start_with(&places.program, &settle)?;
+    let mut page = Page::open(&browser, &program.url, 1_440, 900, false)?;
+    page.wait("the first round", SOME_TIME, ASKED)?;
+    page.click("leave")?;
+    let why = program.ended(SOME_TIME).err().unwrap_or_default();
+    check("a run that was left is no success", why.contains("failed"), why)?;
+    check("nothing was played", !out.join("round-1").exists(), &out)?;
+    page.wait("the page says so", SOME_TIME, "!document.getElementById('banner').hidden")?;
+    let said = page.text("document.getElementById('banner').textContent")?;
+    check("and that it can be closed", said.contains("close this page"), said)
 }
 
 #[test]
