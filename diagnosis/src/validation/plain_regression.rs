@@ -80,7 +80,31 @@ pub(crate) fn follows(
     let delayed =
         delay(fit, holdout, estimator).map(|part| ("a command that acts later than it is recorded", part));
     let all = all.into_iter().filter_map(|(what, part)| Some((what, part?))).chain(delayed);
-    all.max_by(|a, b| a.1.total_cmp(&b.1))
+    let together = || Some(("speed, travel and angle together", together(fit, holdout, estimator, turn)?));
+    all.max_by(|a, b| a.1.total_cmp(&b.1)).or_else(together)
+}
+
+/// The part that forces against the motion, along the travel and over the turn predict together,
+/// where none does alone.
+fn together(fit: &Left, holdout: &Left, estimator: &Estimator, turn: Option<f64>) -> Option<f64> {
+    let columns = |left: &Left, against: [bool; 2]| {
+        of_motion(left, &|track, j| {
+            let (x, v) = (track.motion.x[j], track.motion.v[j]);
+            let of_speed = [v, v.signum()].into_iter().zip(against).filter(|(_, is_in)| *is_in);
+            let of_turn = turn.map_or_else(Vec::new, |turn| waves(x / turn));
+            of_speed.map(|(column, _)| column).chain([x, x * x]).chain(of_turn).collect()
+        })
+    };
+    // As alone: only a force against the motion counts.
+    let mut against = [true; 2];
+    let first = solve(fit, &columns(fit, against))?;
+    against = [first[0] < 0.0, first[1] < 0.0];
+    let theta = solve(fit, &columns(fit, against))?;
+    let friction = against.iter().filter(|is_in| **is_in).count();
+    if theta[..friction].iter().any(|x| *x > 0.0) {
+        return None;
+    }
+    gain(holdout, &columns(holdout, against), &theta, estimator)
 }
 
 /// Cosine and sine of the first orders of a turn, at a place in turns.

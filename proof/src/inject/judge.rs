@@ -3,6 +3,7 @@
 
 use serde_json::Value;
 
+use super::plain::{Best, Found};
 use super::regress::Oracle;
 use crate::tool::{Answer, Named};
 
@@ -22,10 +23,26 @@ pub(crate) struct Case {
     pub(crate) lost: Lost,
     /// Names that the tool gives on the untouched machine.
     pub(crate) own: Vec<Named>,
-    /// The plain rival: what it finds here, and what it finds on the untouched machine.
-    pub(crate) plain: Vec<(&'static str, f64)>,
-    pub(crate) plain_own: Vec<(&'static str, f64)>,
+    /// The plain rivals: what they find here, and what they find on the untouched machine.
+    pub(crate) plain: Plain,
+    pub(crate) plain_own: Plain,
     pub(crate) seconds: f64,
+}
+
+/// Findings of the plain rivals, by the rule that chose among the laws that take enough.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Plain {
+    pub(crate) by_share: Vec<Found>,
+    pub(crate) by_evidence: Vec<Found>,
+}
+
+impl Plain {
+    pub(crate) fn of(&self, best: Best) -> &[Found] {
+        match best {
+            Best::TakesMost => &self.by_share,
+            Best::Evidence => &self.by_evidence,
+        }
+    }
 }
 
 /// The rank of an effect among the hypotheses of the report.
@@ -135,18 +152,18 @@ impl Case {
         }
     }
 
-    /// The plain rival's names from a share of the force error on, in the same way.
-    pub(crate) fn plain_names(&self, least: f64) -> Vec<(&'static str, bool)> {
-        let taken = |list: &[(&'static str, f64)]| -> Vec<&'static str> {
-            list.iter().take_while(|(_, share)| *share >= least).map(|(name, _)| *name).collect()
+    /// A plain rival's names from a share of the force error on, in the same way.
+    pub(crate) fn plain_names(&self, best: Best, least: f64) -> Vec<(&'static str, bool)> {
+        let taken = |list: &[Found]| -> Vec<&'static str> {
+            list.iter().take_while(|found| found.share >= least).map(|found| found.name).collect()
         };
-        let own = taken(&self.plain_own);
-        let names = taken(&self.plain).into_iter();
+        let own = taken(self.plain_own.of(best));
+        let names = taken(self.plain.of(best)).into_iter();
         names.filter(|n| *n == self.hidden || !own.contains(n)).map(|n| (n, n == self.hidden)).collect()
     }
 
-    pub(crate) fn plain_said(&self, least: f64) -> Said {
-        let names = self.plain_names(least);
+    pub(crate) fn plain_said(&self, best: Best, least: f64) -> Said {
+        let names = self.plain_names(best, least);
         match names.iter().any(|(_, right)| *right) {
             true => Said::Found,
             false if names.is_empty() => Said::Silent,
@@ -161,6 +178,10 @@ pub(crate) mod tests {
     use crate::judge::tests::says;
     use serde_json::json;
 
+    fn found(name: &'static str, share: f64) -> Found {
+        Found { name, share, nats: 0.0, lead: 0.0 }
+    }
+
     pub(crate) fn case(hidden: &'static str, names: &[(&str, f64)], own: &[(&str, f64)]) -> Case {
         Case {
             id: "1".into(),
@@ -173,8 +194,8 @@ pub(crate) mod tests {
             answer: Ok(says(names)),
             lost: Lost::NotListed,
             own: says(own).effects,
-            plain: vec![(hidden, 0.3), ("cogging", 0.06)],
-            plain_own: Vec::new(),
+            plain: Plain { by_share: vec![found(hidden, 0.3), found("cogging", 0.06)], ..Plain::default() },
+            plain_own: Plain::default(),
             seconds: 1.0,
         }
     }
@@ -190,8 +211,10 @@ pub(crate) mod tests {
         failed.answer = Err("it broke".into());
         assert_eq!(failed.said(), Said::NoReport);
         let plain = case("quadratic_drag", &[], &[]);
-        assert_eq!(plain.plain_names(0.05).len(), 2);
-        assert_eq!((plain.plain_said(0.15), plain.plain_said(0.4)), (Said::Found, Said::Silent));
+        assert_eq!(plain.plain_names(Best::TakesMost, 0.05).len(), 2);
+        let said = |best, least| plain.plain_said(best, least);
+        assert_eq!((said(Best::TakesMost, 0.15), said(Best::TakesMost, 0.4)), (Said::Found, Said::Silent));
+        assert_eq!(said(Best::Evidence, 0.15), Said::Silent);
     }
 
     #[test]

@@ -4,6 +4,7 @@
 mod carrier;
 mod case;
 mod conceal;
+mod discrepancy;
 #[cfg(test)]
 mod exact;
 mod judge;
@@ -22,7 +23,8 @@ use std::time::Instant;
 
 use carrier::{Carrier, Place};
 use case::{Drawn, Ground};
-use judge::Case;
+use judge::{Case, Plain};
+use plain::Best;
 use untouched::Untouched;
 
 use crate::options::Options;
@@ -44,8 +46,8 @@ const CASES: usize = 44;
 struct Known {
     place: Place,
     untouched: Untouched,
-    /// The findings of the plain rival, once it has been run.
-    plain: OnceLock<Vec<(&'static str, f64)>>,
+    /// The findings of the plain rivals, once they have been run.
+    plain: OnceLock<Plain>,
     /// Its recordings, once a draw has asked for them; none where they cannot be read.
     ground: OnceLock<Option<Ground>>,
 }
@@ -212,9 +214,10 @@ fn run_case(
     let seconds = start.elapsed().as_secs_f64();
     let report = std::fs::read_to_string(out.join("diagnosis.json")).ok();
     let report = report.and_then(|text| serde_json::from_str(&text).ok()).unwrap_or_default();
-    let plain = |carrier: &Carrier| -> Vec<(&'static str, f64)> {
+    let plain = |carrier: &Carrier| {
         let least = PLAIN_SHARES.iter().copied().fold(1.0, f64::min);
-        plain::select(carrier, least).iter().map(|f| (f.name, f.share)).collect()
+        let by = |best| plain::select(carrier, least, best);
+        Plain { by_share: by(Best::TakesMost), by_evidence: by(Best::Evidence) }
     };
     let case = Case {
         id,
