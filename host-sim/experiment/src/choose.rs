@@ -170,6 +170,8 @@ impl Bench<'_> {
     /// limits.
     fn whole(&self, input: Input) -> Option<(Alternative, Vec<Prediction>)> {
         let motions = self.motions(&input)?;
+        // What judges is played with other numbers, and has to stay within the limits too.
+        self.motions(&input.varied())?;
         let rivals = &self.case.rivals;
         let (mut pairs, mut nats) = (Vec::new(), vec![vec![f64::INFINITY; rivals.len()]; rivals.len()]);
         let (mut gathered, mut least) = ((String::new(), Vec::new()), f64::INFINITY);

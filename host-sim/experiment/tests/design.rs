@@ -2,7 +2,7 @@
 
 use diagnosis::effects::{Effect, EffectName};
 use diagnosis::rig::Rig;
-use experiment::{Case, Limits, Rival, Signal, design};
+use experiment::{Case, Limits, Prediction, Rival, Signal, design};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
@@ -116,9 +116,14 @@ fn no_rival_leaves_the_limits_less_a_fifth() {
     case.limits = Limits { travel: 2.0, back: 2.0, speed: 5.0, force: 0.004 };
     let design = design(&case, 12.0, 3).expect("some inputs are within the limits");
     for (prediction, rival) in design.predictions.iter().zip(&design.case.rivals) {
-        let most = |column: &[f64]| column.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
-        assert!(most(&prediction.position) <= 1.6 && most(&prediction.velocity) <= 4.0);
-        assert!(most(&prediction.command) * rival.rig.actuator.gain <= 0.0032);
+        // The same with other numbers is played too, to judge.
+        let judges = design.chosen.input.varied();
+        let judged = Prediction::new(rival, &judges, design.servo, &design.case.limits);
+        for motion in [prediction, &judged] {
+            let most = |column: &[f64]| column.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+            assert!(most(&motion.position) <= 1.6 && most(&motion.velocity) <= 4.0);
+            assert!(most(&motion.command) * rival.rig.actuator.gain <= 0.0032);
+        }
     }
 }
 

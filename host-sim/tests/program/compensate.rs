@@ -100,6 +100,18 @@ fn no_part_is_tried_without_beyond_the_motion_allowed() {
 }
 
 #[test]
+fn nothing_moves_where_the_motion_allowed_is_too_short() {
+    let (mut line, mut steps) = (line(rig_hidden()), Vec::new());
+    let wish = Wish { motion_s: 20.0, ..Wish::default() };
+    let refused = compensate::compensate(&mut line, &rig("hidden-found.toml"), wish, |step| {
+        steps.push(step.to_string());
+        Ok(())
+    });
+    let said = refused.expect_err("it needs more").to_string();
+    assert!(said.contains("20 s are allowed") && steps.is_empty(), "{said} {steps:?}");
+}
+
+#[test]
 fn parts_that_the_hand_feels_more_are_undone() {
     let mut wrong = rig("hidden-found.toml");
     // hidden.toml has no offset.

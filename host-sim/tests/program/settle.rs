@@ -54,6 +54,9 @@ fn what_was_settled_is_fed_forward_and_the_hand_feels_less() {
     for file in ["device.toml", "compensation.html", "settle.html"] {
         assert!(out.join(file).is_file(), "{file}");
     }
+    let patched = Rig::read(&out.join("patched-rig.toml")).expect("it was written");
+    let has = |name: &str| patched.effects.iter().any(|effect| effect.name.as_str() == name);
+    assert!(settled.names.iter().all(|name| has(&name.class[0])), "{:?}", patched.effects);
 }
 
 /// A lag of 0.2 ms, which the first round does not tell from a delay.

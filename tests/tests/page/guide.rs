@@ -136,26 +136,39 @@ fn empty(scratch: &Path, name: &str) -> Result<PathBuf, Error> {
 
 #[test]
 fn leaving_the_page_ends_settling_before_anything_moves() {
-    if let Err(error) = leave_settling() {
+    if let Err(error) = leave_settling("page-settle-left", false) {
         panic!("{error}");
     }
 }
 
-fn leave_settling() -> Result<(), Error> {
+#[test]
+fn leaving_the_page_ends_settling_while_it_plays() {
+    if let Err(error) = leave_settling("page-settle-stopped", true) {
+        panic!("{error}");
+    }
+}
+
+fn leave_settling(name: &str, while_it_plays: bool) -> Result<(), Error> {
     let places = Places::find()?;
-    let scratch = places.scratch("page-settle-left")?;
+    let scratch = places.scratch(name)?;
     let browser = Chromium::start(&scratch)?;
     let plant = concat!(env!("CARGO_MANIFEST_DIR"), "/fixtures/hidden.toml");
     let out = empty(&scratch, "settled")?;
     let folder = out.to_str().ok_or("the target folder has a plain name")?;
     let settle = ["settle", "--page", "--port", "0", "--plant", plant, "--out", folder];
+    // The longest round there is, so that it still plays when it is left.
+    let settle = [&settle[..], &["--inputs", "characterise", "--no-compensate"]].concat();
     let mut program = Program::start_with(&places.program, &settle)?;
     let mut page = Page::open(&browser, &program.url, 1_440, 900, false)?;
     page.wait("the first round", SOME_TIME, ASKED)?;
+    if while_it_plays {
+        page.evaluate("document.querySelector('.step[data-stage=asked] .begin').click()")?;
+        page.wait("it plays", SOME_TIME, "document.querySelector('.news').textContent.includes('played')")?;
+    }
     page.click("leave")?;
     let why = program.ended(SOME_TIME).err().unwrap_or_default();
     check("a run that was left is no success", why.contains("failed"), why)?;
-    check("nothing was played", !out.join("round-1").exists(), &out)?;
+    check("no recording is kept", !out.join("round-1/fit.csv").exists(), &out)?;
     page.wait("the page says so", SOME_TIME, "!document.getElementById('banner').hidden")?;
     let said = page.text("document.getElementById('banner').textContent")?;
     check("and that it can be closed", said.contains("close this page"), said)

@@ -101,7 +101,7 @@ impl Outcome {
 pub struct Wish {
     /// The gains, as a share of the most that is usual, 0 to 1.
     pub share: f64,
-    /// The most motion for trials without one part, with all that came before them, s.
+    /// The most motion of all of it, s.
     pub motion_s: f64,
 }
 
@@ -169,6 +169,7 @@ impl<A: AsyncFnMut(Step) -> Result<(), Error>> Work<'_, '_, A> {
     async fn run(&mut self) -> Result<Outcome, Error> {
         let radius = self.before.roller_radius.0.to_num::<f64>();
         let (turns, hold) = excitations(self.found.inertia, radius, false);
+        self.may_move(&turns, &hold)?;
         let level = if self.found.has_weight { None } else { Some(self.turn_level(&turns).await?) };
         (self.ask)(Step::Tilt).await?;
         self.bench.settle().await?;
@@ -199,6 +200,19 @@ impl<A: AsyncFnMut(Step) -> Result<(), Error>> Work<'_, '_, A> {
             is_compensated,
             motion_s: self.bench.played_s(),
         })
+    }
+
+    /// Refuses what would take more motion than is allowed.
+    fn may_move(&self, turns: &Excitation, hold: &Excitation) -> Result<(), Error> {
+        let level = if self.found.has_weight { 0.0 } else { seconds(turns) };
+        let needed = level + 2.0 * (seconds(turns) + seconds(hold));
+        if needed <= self.wish.motion_s {
+            return Ok(());
+        }
+        Err(Error::failed(format_args!(
+            "turns of this roller before and after take {needed:.0} s of motion, and {:.0} s are allowed; run host-sim compensate with the report, which has no limit of motion",
+            self.wish.motion_s.max(0.0)
+        )))
     }
 
     /// The slow turns with the device level.
@@ -234,7 +248,7 @@ impl<A: AsyncFnMut(Step) -> Result<(), Error>> Work<'_, '_, A> {
         angle: Option<angle::Angle>,
     ) -> Result<(Option<Trial>, Vec<String>), Error> {
         let (turns, hold) = excitations(self.found.inertia, full.roller_radius.0.to_num(), true);
-        let trial_s = f64::from(turns.duration_ms + hold.duration_ms) * 1e-3;
+        let trial_s = seconds(&turns) + seconds(&hold);
         let mut taken_back = Vec::new();
         let mut kept = self.try_it(full, angle, Step::After).await?;
         while excess(before, &kept.felt) > 0.0 {
@@ -358,6 +372,10 @@ fn excitations(inertia: f64, radius_mm: f64, compensated: bool) -> (Excitation, 
         speed: MillimetresPerSecond(I16F16::from_num(SPEED_MM_S)),
     };
     (excitation(signal, (2.0 * stroke / SPEED_MM_S * 1e3) as u32), excitation(Signal::Hold, HOLD_MS))
+}
+
+fn seconds(excitation: &Excitation) -> f64 {
+    f64::from(excitation.duration_ms) * 1e-3
 }
 
 async fn play(

@@ -149,6 +149,8 @@ pub struct Settled {
     pub unsure: Vec<Name>,
     /// Why no further round follows, a sentence without its full stop.
     pub conclusion: String,
+    /// Motion of a round that could not be diagnosed, s.
+    pub discarded_s: f64,
     /// The force on a hand before and after, or why nothing is fed forward; none where nothing is
     /// named or it was not asked for.
     pub feel: Option<Result<Feel, String>>,
@@ -177,9 +179,9 @@ impl Settled {
         })
     }
 
-    /// Motion of all rounds, s.
+    /// Motion of all rounds, s, the last one included if it could not be diagnosed.
     pub fn motion_s(&self) -> f64 {
-        self.rounds.iter().map(|round| round.seconds).sum()
+        self.rounds.iter().map(|round| round.seconds).sum::<f64>() + self.discarded_s
     }
 }
 
@@ -292,6 +294,7 @@ impl Run<'_> {
                 Err(error) => {
                     // The names of the round before stand.
                     settled.conclusion = format!("the recordings of round {number} cannot be used: {error}");
+                    settled.discarded_s = asked.programmes.iter().map(Programme::seconds).sum();
                     return Ok(last);
                 }
             };
@@ -358,12 +361,12 @@ fn first(limited: &Limited, rig: &Rig, settings: &Settings) -> Result<Asked, Err
     match settings.inputs {
         Inputs::Designed => {
             let why = "no recording yet: speeds, reversals and frequencies of every kind";
-            limited.general(why, GENERAL_S.min(0.5 * settings.motion_s))
+            limited.general(why, GENERAL_S.min(0.5 * settings.rounds_s()))
         }
-        Inputs::Multisines => limited.multisine(settings.seed, GENERAL_S.min(0.5 * settings.motion_s)),
-        Inputs::Passive => limited.practice(0.5 * settings.motion_s),
+        Inputs::Multisines => limited.multisine(settings.seed, GENERAL_S.min(0.5 * settings.rounds_s())),
+        Inputs::Passive => limited.practice(0.5 * settings.rounds_s()),
         Inputs::Characterise => limited.checked(Asked {
-            programmes: shortened(programmes(rig, limited.radius_mm()), settings.motion_s),
+            programmes: shortened(programmes(rig, limited.radius_mm()), settings.rounds_s()),
             words: "the excitations of characterise".into(),
             why: "the set that characterise plays".into(),
             design: None,

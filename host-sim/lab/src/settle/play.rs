@@ -6,7 +6,7 @@ use crate::characterise::programme::{Programme, Step, TRAVEL_MM};
 use control_core::Config;
 use control_core::excitation::{self, Excitation, Servo};
 use control_core::units::{Millimetres, MillimetresPerSecond, MillinewtonMetres};
-use device_setup::servo::servo;
+use device_setup::servo::{on_roller, servo};
 use device_sim::error::Error;
 use diagnosis::rig::Rig;
 use experiment::{Design, Input, Limits, Segment, Signal, random_multisine};
@@ -114,13 +114,21 @@ impl Limited {
             )
         });
         let input = design.chosen.input.clone();
-        self.of_input(&input, why, Some(Box::new(design)))
+        // The predictions, and with them the limits, are of the design's own servo.
+        let servo = on_roller(design.servo, self.radius_mm);
+        self.of_input(&input, why, Some((Box::new(design), servo)))
     }
 
     /// An input twice: once to fit, once with other numbers to judge.
-    fn of_input(&self, input: &Input, why: String, design: Option<Box<Design>>) -> Result<Asked, Error> {
+    fn of_input(
+        &self,
+        input: &Input,
+        why: String,
+        design: Option<(Box<Design>, Servo)>,
+    ) -> Result<Asked, Error> {
+        let (design, servo) = design.map_or((None, self.servo), |(design, servo)| (Some(design), servo));
         let programme = |file, input: &Input| {
-            let steps = input.segments.iter().map(|segment| self.step(segment)).collect();
+            let steps = input.segments.iter().map(|segment| self.step(segment, servo)).collect();
             Programme { file, steps }
         };
         let programmes = vec![programme("fit.csv", input), programme("holdout.csv", &input.varied())];
@@ -133,7 +141,7 @@ impl Limited {
         Ok(asked)
     }
 
-    fn step(&self, segment: &Segment) -> Step {
+    fn step(&self, segment: &Segment, servo: Servo) -> Step {
         let mm = |rad: f64| I16F16::saturating_from_num(rad * self.radius_mm);
         let torque = |newton_metres: f64| MillinewtonMetres(I16F16::saturating_from_num(newton_metres * 1e3));
         let ms = |seconds: f64| (seconds * 1e3).round().clamp(0.0, 65_535.0) as u16;
@@ -166,7 +174,7 @@ impl Limited {
         let excitation = Excitation {
             signal,
             duration_ms: (segment.seconds * 1e3).round() as u32,
-            servo: self.servo,
+            servo,
             travel: Millimetres(I16F16::from_num(TRAVEL_MM)),
             compensated: false,
         };
