@@ -13,6 +13,7 @@ mod formula;
 pub(crate) mod joint_terms;
 mod law;
 mod load;
+pub(crate) mod plain_laws;
 mod shape;
 mod state;
 mod travel_profile;

@@ -213,7 +213,7 @@ pub(crate) fn odd_one(all: &[&Recording], rig: &Rig) -> Option<(usize, String)> 
     Some((
         odd,
         format!(
-            "the force of {file} for its motion is {factor:.0} times {than} in the other recordings: its command or its counts have another unit"
+            "the force of {file} for its motion is {factor:.0} times {than} in the other recordings: its command or its counts have another unit; convert them, or leave the recording out"
         ),
     ))
 }

@@ -70,11 +70,13 @@ fn alone(recording: &Recording) -> Option<String> {
     let largest = recording.command.iter().fold(0.0_f64, |m, u| m.max(u.abs()));
     // None at all is a free motion; one that never changes is distinguished from no offset.
     if largest > 0.0 && spread(&recording.command) <= 1e-6 * largest {
-        return Some(format!("the command of {file} is constant"));
+        return Some(format!("the command of {file} is constant; record one that changes"));
     }
     // Longest gap: a hold of the last command over it would be a guess.
     let gap = recording.time_s.windows(2).map(|w| w[1] - w[0]).fold(0.0, f64::max);
-    (gap > 0.25 * seconds).then(|| format!("{file} has a gap of {gap:.2} s in its {seconds:.2} s"))
+    (gap > 0.25 * seconds).then(|| {
+        format!("{file} has a gap of {gap:.2} s in its {seconds:.2} s; cut it into two recordings there")
+    })
 }
 
 /// A sentence on a rate that is not read.
@@ -108,7 +110,7 @@ pub(crate) fn unusable(recording: &Recording, rig: &Rig) -> Option<String> {
         let over = recording.command.iter().filter(|u| u.abs() > 1.5 * limit).count();
         if over * 10 > recording.len() {
             return Some(format!(
-                "the command of {file} reaches {largest:.4}, far above the drive's limit of {limit}: its unit is not the rig's"
+                "the command of {file} reaches {largest:.4}, far above the drive's limit of {limit}: its unit is not the rig's; convert the column, or correct the limit"
             ));
         }
     }
@@ -120,7 +122,7 @@ pub(crate) fn unusable(recording: &Recording, rig: &Rig) -> Option<String> {
     // there the motion itself must be possible.
     (largest > 0.0 && travel > IMPOSSIBLE * asked * seconds * seconds).then(|| {
         format!(
-            "{file} travels {travel:.3} {}, which its command cannot cause with the rig's inertia and gain: a unit is wrong",
+            "{file} travels {travel:.3} {}, which its command cannot cause with the rig's inertia and gain: correct the unit that is wrong (counts, command or time)",
             rig.kind.length()
         )
     })

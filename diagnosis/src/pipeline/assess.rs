@@ -18,6 +18,7 @@ use crate::validation::free_form_check::{self, FreeFormShare, Unnamed};
 use crate::validation::holdout_set::HoldoutSet;
 use crate::validation::out_of_library::{self, Foreign};
 use crate::validation::parameters;
+use crate::validation::second_selection;
 
 /// Everything that the decision rests on.
 pub(crate) struct Assessment {
@@ -59,6 +60,7 @@ pub(crate) fn assess(prepared: &Prepared, found: Found) -> Result<Assessment, Re
         return Err(reason);
     }
     let (mut weighed, beside) = free_form_check::check(weighed, &context);
+    second_selection::compare(&mut weighed, &prepared.plain);
     let named_alone = only_named(&scales, &mut weighed);
     let nothing_named = weighed.named().is_empty();
     let unnamed =

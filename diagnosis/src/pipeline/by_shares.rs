@@ -105,7 +105,7 @@ fn may_confirm(effect: &Effect, selected: &Selected) -> bool {
 }
 
 /// Returns the facts about the axis that the recordings show.
-fn shown(prepared: &Prepared, found: &Found) -> Shown {
+pub(super) fn shown(prepared: &Prepared, found: &Found) -> Shown {
     let (count, rig) = (prepared.span.count, &prepared.nominal.rig);
     let excitation = Excitation::of(&found.fit, count, rig.turn()).shown();
     Shown { linear: rig.kind == Kind::Linear, count, ..excitation }
@@ -166,7 +166,7 @@ fn as_found(own: &[Effect], materials: Vec<Material>) -> ByShares {
 }
 
 /// True if physics without a name explains most of what a refit leaves, as surely as a name must.
-fn is_foreign(prepared: &Prepared, found: &Found) -> bool {
+pub(super) fn is_foreign(prepared: &Prepared, found: &Found) -> bool {
     let context = prepared.context(&found.fit);
     let refit = context.fit(Model::default(), &found.null.noise, Colour::White);
     out_of_library::alone(&context, &refit, &found.holdout).is_some()
@@ -223,7 +223,7 @@ fn beside(
 }
 
 /// A class with a name of it first, and then those that no such recordings tell from it.
-fn class_of(name: EffectName, twins: Vec<EffectName>, near: Vec<EffectName>) -> Vec<EffectName> {
+pub(super) fn class_of(name: EffectName, twins: Vec<EffectName>, near: Vec<EffectName>) -> Vec<EffectName> {
     let mut class = vec![name];
     for other in twins.into_iter().chain(near) {
         if class.len() < MOST_IN_CLASS && !class.contains(&other) {
@@ -279,7 +279,7 @@ fn immaterial(effect: &Effect, selected: &[Selected], selection: &Selection) -> 
 }
 
 /// The found recordings with a model of other effects.
-fn standing(
+pub(super) fn standing(
     prepared: &Prepared,
     found: &Found,
     effects: Vec<Effect>,
@@ -306,7 +306,7 @@ fn standing(
 
 /// Ratio of the force that a model leaves to the force that reading whole counts causes under some
 /// noise: the smaller one of the fitted and the held-out recordings.
-fn discrepancy(prepared: &Prepared, found: &Found, model: &FittedModel, noise: &Noise) -> f64 {
+pub(super) fn discrepancy(prepared: &Prepared, found: &Found, model: &FittedModel, noise: &Noise) -> f64 {
     let (nominal, holdout) = (&prepared.nominal, &found.holdout.smoothed);
     let estimator = Estimator::new(&found.fit, noise, prepared.scale);
     let inertia = parameters::scale(nominal, model).0;

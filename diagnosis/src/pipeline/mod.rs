@@ -7,6 +7,7 @@
 //! changes none of it. What comes out is a [`diagnosis::Diagnosis`].
 
 mod assess;
+mod by_plain;
 mod by_shares;
 mod contenders;
 mod decide;
@@ -23,6 +24,7 @@ use crate::io::recording::Recording;
 use crate::io::rig::Rig;
 use crate::io::sufficiency;
 use assess::Assessment;
+use by_plain::{by_plain, by_plain_alone};
 use by_shares::{ByShares, by_shares, confirmed};
 use diagnosis::{Diagnosis, Reason};
 use prepare::Prepared;
@@ -58,9 +60,22 @@ pub(crate) fn run(
     })
 }
 
+/// Assesses what was found; where nothing is named, what a plain selection found.
+fn assessed(prepared: &Prepared, found: Found) -> Result<Assessment, Reason> {
+    let by_plain = by_plain(prepared, &found);
+    let assessed = assessed_as_found(prepared, found);
+    match by_plain {
+        Some(plain) if assessed.as_ref().is_ok_and(|one| one.weighed.named().is_empty()) => {
+            let plain = by_selected(prepared, plain, None).and_then(by_plain_alone);
+            plain.map_or(assessed, Ok)
+        }
+        _ => assessed,
+    }
+}
+
 /// Assesses what was found, by shares of the force error where other physics limits; where those
 /// name nothing in the end, likelihoods decide as elsewhere.
-fn assessed(prepared: &Prepared, found: Found) -> Result<Assessment, Reason> {
+fn assessed_as_found(prepared: &Prepared, found: Found) -> Result<Assessment, Reason> {
     match by_shares(prepared, &found) {
         ByShares::Nothing => assess::assess(prepared, found),
         ByShares::Confirmed(materials) => assess::assess(prepared, confirmed(found, materials)),

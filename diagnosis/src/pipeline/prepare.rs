@@ -18,6 +18,7 @@ use crate::io::rig::Rig;
 use crate::selection::candidates::span_of;
 use crate::selection::context::{FitContext, FittedModel};
 use crate::validation::holdout_set::HoldoutSet;
+use crate::validation::plain_selection::PlainSelection;
 use crate::validation::residuals::{drive_force, forces};
 
 /// Rig and recordings before any effect is looked for.
@@ -34,6 +35,8 @@ pub(crate) struct Prepared {
     pub(crate) scale: f64,
     /// Noise under the refitted nominal model.
     pub(crate) noise: Noise,
+    /// The effects that a plain regression finds.
+    pub(crate) plain: PlainSelection,
 }
 
 impl Prepared {
@@ -45,6 +48,7 @@ impl Prepared {
 
 /// Cuts recordings into blocks, refits the nominal model, and looks for lost counts.
 pub(crate) fn prepare(rig: &Rig, fit: &[Recording], holdout: &[Recording], progress: Progress) -> Prepared {
+    let plain = PlainSelection::new(rig, fit, holdout);
     let cut = |all: &[Recording]| all.iter().map(|r| BlockedRecording::moving(r, rig)).collect::<Vec<_>>();
     let (mut tracks, mut holdout) = (cut(fit), cut(holdout));
     let mut nominal = Nominal::of(rig);
@@ -74,7 +78,7 @@ pub(crate) fn prepare(rig: &Rig, fit: &[Recording], holdout: &[Recording], progr
     for (r, track) in tracks.iter_mut().enumerate() {
         (track.place, track.bias) = (Some(r), first.fit.bias(r));
     }
-    Prepared { given: rig.clone(), nominal, fit: tracks, holdout, span, scale, noise }
+    Prepared { given: rig.clone(), nominal, fit: tracks, holdout, span, scale, noise, plain }
 }
 
 /// Part of the force that a refit may leave for the forces to be in balance.

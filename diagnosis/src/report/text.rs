@@ -59,6 +59,7 @@ pub(crate) fn rejection(why: &Rejection) -> String {
             "gain and friction would change by the same part, as where the inertia changes".into()
         }
         Rejection::Undecided => "more effects explain it as well than a class may hold".into(),
+        Rejection::NotInPlain { found } => format!("a plain regression finds {found} and not this"),
         Rejection::Improbable { probability, weakness: weakest } => {
             format!("it is right with a probability of only {probability:.2}: {}", weakness(weakest))
         }

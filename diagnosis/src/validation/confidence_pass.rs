@@ -47,6 +47,8 @@ pub(crate) struct WeighedEffect {
     pub(crate) undecided: bool,
     /// Part of the travel over which it bends, where that is more than bristles bend.
     pub(crate) creeps: Option<f64>,
+    /// The effect that a plain regression finds, where that is named and this one is not found.
+    pub(crate) instead: Option<EffectName>,
     /// The better explanation, where something without a name explains significantly more.
     pub(crate) rather: Option<Rather>,
 }
@@ -175,6 +177,9 @@ impl WeighedModel {
     fn contradiction(&self, assessed: &WeighedEffect) -> Option<Rejection> {
         if let Some(from) = self.twin_beside(assessed) {
             return Some(Rejection::Indistinguishable { from });
+        }
+        if let Some(found) = assessed.instead {
+            return Some(Rejection::NotInPlain { found });
         }
         if assessed.found.material.is_some() {
             return assessed.found.rejection_by_shares(assessed.is_there);
@@ -409,6 +414,7 @@ impl Scales<'_> {
                 is_there,
                 undecided,
                 creeps,
+                instead: None,
                 rather,
             };
         }
@@ -424,7 +430,19 @@ impl Scales<'_> {
             // A spring that creeps depends on time, so no law of the travel fits it everywhere,
             // however far it bends.
             .filter(|_| !found.fits_everywhere());
-        WeighedEffect { found, class, evidence, confidence, parameters, is_there, undecided, creeps, rather }
+        let instead = None;
+        WeighedEffect {
+            found,
+            class,
+            evidence,
+            confidence,
+            parameters,
+            is_there,
+            undecided,
+            creeps,
+            instead,
+            rather,
+        }
     }
 }
 

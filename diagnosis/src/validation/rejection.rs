@@ -49,6 +49,8 @@ pub(crate) enum Rejection {
     InertiaChanges,
     /// More effects explain it as well than a class may hold.
     Undecided,
+    /// A plain regression of the force finds another effect, which is named, and not this one.
+    NotInPlain { found: EffectName },
     /// The probability that it is right is too small.
     Improbable { probability: f64, weakness: Weakness },
     /// The recordings cannot tell it from a named effect.

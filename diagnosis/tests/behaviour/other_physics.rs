@@ -29,8 +29,8 @@ fn a_push_that_has_no_name_alone_is_not_named() {
 fn friction_of_a_cold_axis_is_found_without_it_in_the_rig() {
     let machine = Machine { push: 2.0, forward: 0.2, backward: 0.2, cold: 60.0, disturbance: 0.0, ..AXIS };
     let outcome = pushed(machine, "inertia = 2.0\nviscous = 8.0");
-    let named = outcome.report.effects.iter().find(|effect| effect.class.contains(&N::FrictionDrift));
-    let drift = named.unwrap_or_else(|| panic!("{}", outcome.report.sentence));
+    let named = outcome.report.effects.iter().find(|effect| effect.name == N::FrictionDrift);
+    let drift = named.unwrap_or_else(|| panic!("{}", outcome.summary()));
     let change = drift.parameters["change"].value;
     assert!((-1.05..-0.9).contains(&change), "{change}: from 12.2 N to 0.2 N");
 }

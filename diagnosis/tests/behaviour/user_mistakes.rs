@@ -83,7 +83,9 @@ fn a_constant_command_in_one_recording_leaves_the_others_usable() {
     assert_eq!(outcome.report.verdict, Verdict::InsufficientExcitation);
     let sentence = &outcome.report.sentence;
     assert!(
-        sentence.contains("fit2.csv is constant; fit.csv and holdout.csv could still be used"),
+        sentence.contains(
+            "fit2.csv is constant; record one that changes; fit.csv and holdout.csv could still be used"
+        ),
         "{sentence}"
     );
 }

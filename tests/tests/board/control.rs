@@ -18,7 +18,7 @@ fn the_board_writes_the_codes_that_control_core_computes() {
 }
 
 #[test]
-fn so_it_does_with_the_law_of_seed_002() {
+fn the_board_computes_the_law_of_seed_002_to_the_bit() {
     let (states, punctures) = follows(board(deep(1_000_000_000)), Some(laws::shoulder()));
     for state in [State::Approach, State::Elastic, State::Puncture, State::Friction, State::Withdrawal] {
         assert!(states[state as usize] > 200, "{state:?} was hardly reached: {states:?}");
@@ -27,7 +27,7 @@ fn so_it_does_with_the_law_of_seed_002() {
 }
 
 #[test]
-fn so_it_does_with_the_table_of_seed_000() {
+fn the_board_computes_the_table_of_seed_000_to_the_bit() {
     let (states, _) = follows(board(deep(1_000_000_000)), Some(laws::phantom()));
     for state in [State::Approach, State::Friction, State::Withdrawal] {
         assert!(states[state as usize] > 500, "{state:?} was hardly reached: {states:?}");

@@ -46,6 +46,13 @@ impl<'a> Selection<'a> {
         (fits > 0 && fits < sights.len()).then_some(Self { context, noise, sights, priors, fits })
     }
 
+    /// An effect in the shape that takes most of the force error by itself; none where a regression
+    /// has no law of it.
+    pub(crate) fn best_of(&self, name: N) -> Option<Share> {
+        let first = State::new(self, Vec::new());
+        first.ranked(&|other| other == name).into_iter().next().map(|(share, _)| share)
+    }
+
     /// The band in which everything is seen, Hz.
     pub(super) fn bandwidth_hz(&self) -> f64 {
         self.sights[0].bandwidth_hz()
