@@ -212,3 +212,29 @@ impl Shown {
         Ok(shown)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fmt::Write as _;
+
+    /// Two recordings: 3 rad ahead and back at 2 rad/s, and 1 rad behind at 0.5 rad/s.
+    #[test]
+    fn the_room_of_an_input_is_where_the_recordings_were() {
+        let mut csv = String::from("file,time_s,velocity,force\n");
+        for (file, speed, turn_s, seconds) in [("a.csv", 2.0, 1.5, 3.0), ("b.csv", -0.5, 9.0, 2.0)] {
+            for row in 0..=(100.0 * seconds) as u32 {
+                let time = f64::from(row) / 100.0;
+                let velocity = if time <= turn_s { speed } else { -speed };
+                writeln!(csv, "{file},{time},{velocity},0").expect("a string");
+            }
+        }
+        let path = std::env::temp_dir().join(format!("residuals-{}.csv", std::process::id()));
+        std::fs::write(&path, csv).expect("there is space");
+        let shown = Shown::read(&path).expect("rows");
+        std::fs::remove_file(&path).expect("it was written");
+        let near = |a: f64, b: f64| (a - b).abs() < 0.05;
+        assert!(near(shown.ahead, 3.0) && near(shown.behind, 1.0), "{} {}", shown.ahead, shown.behind);
+        assert!(near(shown.speed, 2.0) && (shown.reading_s - 0.01).abs() < 1e-6, "{}", shown.reading_s);
+    }
+}

@@ -1,7 +1,7 @@
 //! `settle`, on the virtual device and over a port: the rounds, the use of what was settled, and a
 //! person who ends it.
 
-use crate::common::folder;
+use crate::common::{folder, refused, run};
 use device_sim::device::{Port, Wire};
 use device_sim::error::Error;
 use diagnosis::rig::Rig;
@@ -280,4 +280,15 @@ fn a_run_that_is_ended_keeps_its_rounds() {
     assert!(conclusion.contains("it ended early: not again"), "{conclusion}");
     assert!(out.join("settle.html").is_file());
     assert!(parts.len() > 5 && parts.is_sorted(), "progress never falls: {parts:?}");
+}
+
+#[test]
+fn rounds_motion_and_length_beyond_the_most_are_refused() {
+    let plant = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/fixtures/hidden.toml");
+    let settle = ["settle", "--plant", plant, "--out", "unused"];
+    let with = |flag: &str, value: &str| run(&[&settle[..], &[flag, value]].concat());
+    refused(&with("--rounds", "6"), 2, &["--rounds must be 1 to 5"]);
+    refused(&with("--motion", "181"), 2, &["--motion must be 20 to 180 s"]);
+    let experiment = ["experiment", "--report", "unused", "--out", "unused", "--seconds", "31"];
+    refused(&run(&experiment), 2, &["--seconds must be between 4 and 30"]);
 }
