@@ -34,6 +34,14 @@ impl PlainMotion {
         self.time.len()
     }
 
+    /// True if the inclination changes by more than its sensor trembles: the force of one that does
+    /// not is an offset.
+    fn tilts(&self) -> bool {
+        let square = |less: f64| self.tilt.iter().map(|x| (x - less).powi(2)).sum::<f64>();
+        let mean = self.tilt.iter().sum::<f64>() / self.tilt.len().max(1) as f64;
+        square(mean) > TILTS * square(0.0)
+    }
+
     fn seconds(&self) -> f64 {
         self.time.last().copied().unwrap_or(0.0)
     }
@@ -86,6 +94,9 @@ pub(crate) struct PlainRig {
     pub(crate) turn: Option<f64>,
     pub(crate) is_rotary: bool,
 }
+
+/// Part of the inclination's mean square by which it has to swing about its mean.
+const TILTS: f64 = 1e-3;
 
 /// Columns of a law on a motion, from the drive's force that is predicted.
 type Columns = Box<dyn Fn(&PlainMotion, &[f64]) -> Vec<Vec<f64>> + Send + Sync>;
@@ -161,8 +172,7 @@ impl Laws {
 
     fn along_travel(&mut self, rig: &PlainRig, motions: &[PlainMotion]) {
         self.of_motion(N::PositionSpring, |m, i| m.place[i]);
-        let tilts = |m: &PlainMotion| m.tilt.iter().any(|tilt| *tilt != m.tilt[0]);
-        if !rig.has_weight && motions.iter().all(tilts) {
+        if !rig.has_weight && motions.iter().all(PlainMotion::tilts) {
             self.of_motion(N::TiltGravity, |m, i| -m.tilt[i]);
         }
         if rig.knows_place {
