@@ -149,6 +149,11 @@ pub(crate) const LEAVES_SOMETHING: f64 = 2.0;
 /// Most probability of a name that no share confirms where other physics limits: the gain of a law
 /// says little there.
 pub(crate) const SUREST_BESIDE_PHYSICS: f64 = 0.8;
+/// Part of the force error from which a law goes into the plain selection, and the factor within
+/// which its sizes on held-out and on fitted recordings are: those of the regression that
+/// `prove --inject` sets beside the tool.
+pub(crate) const PLAIN_SHARE: f64 = 0.05;
+pub(crate) const PLAIN_SAME_SIZE: f64 = 2.0;
 /// Part of the force error from which what a plain selection finds first contests the names of the
 /// other selection. Set on seed 63101: of names so contested 23 of 47 are right, and 16 of 34 of
 /// what contests them.

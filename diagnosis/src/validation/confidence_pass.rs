@@ -398,51 +398,41 @@ impl Scales<'_> {
     ) -> WeighedEffect {
         let context = self.context;
         let parameters = parameters::parameters(context, patched, i);
-        let is_there = parameters::is_there(found.effect.name, &parameters);
         let evidence = confidence::evidence(&found, left.evidence);
         let rather = out_of_library::rather(context, patched, i, found.fit.sum);
+        let mut weighed = WeighedEffect {
+            class: Vec::new(),
+            confidence: 0.0,
+            is_there: false,
+            undecided: false,
+            creeps: None,
+            instead: None,
+            found,
+            evidence,
+            parameters,
+            rather,
+        };
+        let found = &weighed.found;
         if let Some(material) = &found.material {
-            let (class, confidence) = (material.class.clone(), material.confidence());
-            let is_there = parameters::has_size(found.effect.name, &parameters);
-            let (undecided, creeps) = (false, None);
-            return WeighedEffect {
-                found,
-                class,
-                evidence,
-                confidence,
-                parameters,
-                is_there,
-                undecided,
-                creeps,
-                instead: None,
-                rather,
-            };
+            weighed.is_there = parameters::has_size(found.effect.name, &weighed.parameters);
+            (weighed.class, weighed.confidence) = (material.class.clone(), material.confidence());
+            return weighed;
         }
-        let class = alternatives::class(&found, self.excitation, left.leaves_much, context);
-        let undecided = alternatives::nearest(&found, &class) < BEHIND_Z;
-        let most = match (undecided, left.is_other_physics) {
+        let class = alternatives::class(found, self.excitation, left.leaves_much, context);
+        weighed.undecided = alternatives::nearest(found, &class) < BEHIND_Z;
+        let most = match (weighed.undecided, left.is_other_physics) {
             (true, _) => UNDECIDED,
             (false, true) => SUREST_BESIDE_PHYSICS,
             (false, false) => 1.0,
         };
-        let confidence = confidence::confidence(&evidence).min(most);
-        let creeps = candidates::creeps(&found.effect, context.span)
+        weighed.creeps = candidates::creeps(&found.effect, context.span)
             // A spring that creeps depends on time, so no law of the travel fits it everywhere,
             // however far it bends.
             .filter(|_| !found.fits_everywhere());
-        let instead = None;
-        WeighedEffect {
-            found,
-            class,
-            evidence,
-            confidence,
-            parameters,
-            is_there,
-            undecided,
-            creeps,
-            instead,
-            rather,
-        }
+        weighed.is_there = parameters::is_there(found.effect.name, &weighed.parameters);
+        weighed.confidence = confidence::confidence(&weighed.evidence).min(most);
+        weighed.class = class;
+        weighed
     }
 }
 

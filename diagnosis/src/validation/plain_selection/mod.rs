@@ -17,16 +17,13 @@ use crate::effects::plain_laws::{PlainLaw, PlainMotion, PlainRig, plain_laws};
 use crate::io::recording::Recording;
 use crate::io::rig::{Kind, Rig};
 use crate::numerics::parallel;
+use crate::thresholds::{PLAIN_SAME_SIZE, PLAIN_SHARE};
 use axis::Axis;
 use regression::{Block, left_on, left_out, solve};
 use std::sync::Arc;
 
 /// Laws that go in at most.
 const MOST: usize = 3;
-/// Part of the force error from which a law goes in.
-const LEAST: f64 = 0.05;
-/// Size on the held-out recordings over that on the others, or the reverse, at most.
-const SAME_SIZE: f64 = 2.0;
 /// Fewest rows of a recording that can tell anything.
 const FEWEST_ROWS: usize = 40;
 
@@ -119,7 +116,7 @@ impl Selecting {
                     return None;
                 }
                 let tried = fixed[i].clone().unwrap_or_else(|| self.columns(&laws[i], &predicted));
-                let share = self.share(&taken, &tried, before).filter(|share| *share >= LEAST)?;
+                let share = self.share(&taken, &tried, before).filter(|share| *share >= PLAIN_SHARE)?;
                 Some((PlainFinding { name, share }, tried))
             };
             let enough = parallel::map(laws.len(), of).into_iter().flatten();
@@ -194,7 +191,7 @@ impl Selecting {
         let own = &coefficients[coefficients.len() - terms..];
         let size = if tried.periodic { own[0].hypot(own[1]) } else { own[0] };
         let ratio = if size == 0.0 { 0.0 } else { there / size };
-        if !(1.0 / SAME_SIZE..=SAME_SIZE).contains(&ratio) {
+        if !(1.0 / PLAIN_SAME_SIZE..=PLAIN_SAME_SIZE).contains(&ratio) {
             return None;
         }
         let on_fit = 1.0 - left_out(&base[..self.fits]) / before.0;
