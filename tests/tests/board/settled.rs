@@ -137,11 +137,15 @@ fn a_concealed_drive_spring_is_settled_on_the_flash_image() {
 }
 
 #[test]
-#[ignore = "nightly: half a minute of the board, recorded at 10 kHz, and its diagnosis, 40 s"]
+#[ignore = "nightly: a minute of the board, recorded at 10 kHz, and two diagnoses"]
 fn cogging_is_settled_on_the_flash_image() {
     let mechanism = SharedMechanism::new(Mechanism::new(ROTOR, TILT));
-    let settled = settled(mechanism.plant(), 1, "settled");
-    // The mechanism has a weight, too, which the data sheet does not tell.
-    let names: Vec<&str> = settled.names.iter().map(|name| name.name.as_str()).collect();
-    assert_eq!(names, ["cogging", "tilt_gravity"], "{}", settled.conclusion);
+    let settled = settled(mechanism.plant(), 2, "settled");
+    let cogging = settled.names.iter().find(|name| name.name == "cogging").expect("cogging is named");
+    assert!(cogging.class.len() == 1 && cogging.confidence >= 0.9, "{cogging:?}");
+    // The mechanism has a weight, too, which the data sheet does not tell. At one tilt throughout
+    // it is a constant force: named or not, nobody may be told that nothing is missing.
+    let others: Vec<&str> = single(&settled).into_iter().filter(|name| *name != "cogging").collect();
+    let is_told = settled.conclusion.contains("a further effect is missing");
+    assert!(others == ["tilt_gravity"] || (others.is_empty() && is_told), "{}", settled.conclusion);
 }

@@ -93,7 +93,7 @@ fn is_settled(report: &Report, settled: &Settled, least_rounds: usize) -> Option
     Some(if report.effects.is_empty() {
         "no effect contends: the simulation leaves out nothing that these inputs show".to_owned()
     } else {
-        "no rival is left".to_owned()
+        format!("no rival is left; what remains is {}", report.remains)
     })
 }
 
