@@ -5,17 +5,18 @@
 
 use super::conceal::{Changed, Concealed, conceal};
 use super::rig_file::RigFile;
-use super::shapes::{Law, Wave};
+use super::shapes::{Along, Law, Wave};
 use super::sight::State;
 use crate::dynamics::recording::Recording;
 use crate::generator::drive::{Drive, Segment, Tones};
 use crate::generator::plant::{
-    Deadband, DeadbandKind, Drift, DriftLaw, Dry, Harmonic, Plant, Stribeck, StribeckLaw, Train,
+    Deadband, DeadbandKind, Drift, DriftLaw, Dry, Harmonic, Plant, Shape, Stribeck, StribeckLaw, Train,
 };
 use crate::generator::series::Series;
 use crate::generator::simulate::{Believed, Row, Run, STEP, simulate};
 use crate::rng::Rng;
 use crate::signal::rms;
+use std::cell::Cell;
 
 const COUNTS: f64 = 1e6;
 const ROW_S: f64 = 2e-3;
@@ -99,6 +100,11 @@ struct Checked {
 
 /// Conceals the law in a recording of the plain plant and drives `other`, which has it.
 fn check(law: Law, size: f64, fast: f64, other: &dyn Fn(&mut Plant)) -> Checked {
+    check_with(law, size, fast, &|plant, _| other(plant))
+}
+
+/// The same, for a plant that depends on the recorded motion.
+fn check_with(law: Law, size: f64, fast: f64, other: &dyn Fn(&mut Plant, &State)) -> Checked {
     let commands: Vec<f64> = (0..ROWS)
         .map(|i| {
             // At rest until a kick that no friction withstands: what a delay takes is nothing, and
@@ -121,7 +127,7 @@ fn check(law: Law, size: f64, fast: f64, other: &dyn Fn(&mut Plant)) -> Checked 
     let changed = conceal(&effect, &original, &state, &rig, 0);
     let away = |plant: &Plant| off(&original, &changed, &recording(&play(plant, &changed.command)));
     let mut has = plant();
-    other(&mut has);
+    other(&mut has, &state);
     Checked { with: away(&has), without: away(&plant()) }
 }
 
@@ -156,6 +162,54 @@ fn forces_are_concealed_as_a_plant_with_them_moves() {
         p.dry.stribeck = Some(Stribeck { peak: 0.15, speed: 0.8, law });
     });
     assert_exact("stribeck", &stribeck, 0.1);
+}
+
+#[test]
+fn frictions_are_concealed_as_a_plant_with_them_moves() {
+    let viscous = check(Law::Viscous, 0.1, 4.0, &|p| p.viscous += 0.1 / 4.0);
+    assert_exact("viscous", &viscous, 0.02);
+    let dry = check(Law::Coulomb, 0.05, 4.0, &|p| p.dry.coulomb += 0.05);
+    assert_exact("dry", &dry, 0.1);
+    let one_way = check(Law::OneWay(1.0), 0.1, 4.0, &|p| {
+        // The same in both directions and an asymmetry that takes it off backward.
+        let more = 0.5 * 0.1 / 4.0;
+        p.viscous_asymmetry = more / (p.viscous + more);
+        p.viscous += more;
+    });
+    assert_exact("one way", &one_way, 0.02);
+    let ramp = Along { from: -1.0, to: 2.0, smooth: false };
+    let shape = Shape::Ramp { from: -1.0, to: 2.0 };
+    let along = check(Law::FrictionAlong(ramp), 0.08, 4.0, &|p| p.dry.profile = Some((0.08, shape)));
+    assert_exact("friction along the travel", &along, 0.1);
+    let damping = check(Law::DampingAlong(ramp), 0.1, 4.0, &|p| {
+        p.damping_profile = Some((0.1 / 4.0, shape));
+    });
+    assert_exact("damping along the travel", &damping, 0.02);
+    let cold = check(Law::WarmingUp(1.5), 0.08, 4.0, &|p| {
+        let start = p.dry.coulomb + 0.08;
+        p.dry.warm = Some(Drift { change: -0.08 / start, time_constant: 1.5, law: DriftLaw::Exponential });
+        p.dry.coulomb = start;
+    });
+    assert_exact("warming up", &cold, 0.1);
+}
+
+#[test]
+fn springs_and_weights_are_concealed_as_a_plant_with_them_moves() {
+    let travel = Cell::new(0.0);
+    let spring = check_with(Law::Spring(0.0), 0.1, 4.0, &|p, state| {
+        travel.set(state.travel());
+        p.spring = Some((0.1 / (0.5 * state.travel()), 0.0, 0.0));
+    });
+    assert!(travel.get() > 0.5, "{} rad of travel", travel.get());
+    assert_exact("spring", &spring, 0.02);
+    let weight = check(Law::Imbalance, 0.1, 4.0, &|p| p.imbalance = Some((0.1, 0.0)));
+    assert_exact("imbalance", &weight, 0.05);
+}
+
+#[test]
+fn an_eccentric_encoder_is_concealed_as_a_plant_with_one_reads() {
+    let read = check(Law::Eccentric, 0.02, 4.0, &|p| p.eccentricity = Some((0.02, 0.0)));
+    assert_exact("eccentric", &read, 0.02);
 }
 
 #[test]

@@ -8,6 +8,8 @@ mod discrepancy;
 #[cfg(test)]
 mod exact;
 mod judge;
+#[cfg(test)]
+mod maps;
 mod plain;
 mod plain_laws;
 mod regress;
