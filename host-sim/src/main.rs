@@ -3,9 +3,8 @@
 
 mod cli;
 
-use clap::Parser;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    live::finish(cli::Cli::try_parse(), cli::Cli::run)
+    live::finish(live::parse::<cli::Cli>(), cli::Cli::run)
 }

@@ -15,19 +15,19 @@ pub struct Layers {
     profile: String,
     /// The point of entry along the limb, away from the trunk, in mm; without it, as the patient's
     /// file says, like the rest
-    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
+    #[arg(long, value_name = "MM")]
     along: Option<f64>,
     /// The point of entry around the limb from its top, in degrees
-    #[arg(long, value_name = "DEGREES", allow_negative_numbers = true)]
+    #[arg(long, value_name = "DEGREES")]
     around: Option<f64>,
     /// The needle's direction seen from above, 0 being along the limb, in degrees
-    #[arg(long, value_name = "DEGREES", allow_negative_numbers = true)]
+    #[arg(long, value_name = "DEGREES")]
     azimuth: Option<f64>,
     /// The needle's inclination below the horizontal, 5 to 90 degrees
     #[arg(long, value_name = "DEGREES")]
     angle: Option<f64>,
     /// The turn of the limb about its axis, in degrees
-    #[arg(long, value_name = "DEGREES", allow_negative_numbers = true)]
+    #[arg(long, value_name = "DEGREES")]
     turn: Option<f64>,
     /// As JSON
     #[arg(long)]

@@ -44,7 +44,7 @@ mod training;
 use clap::{Args, Parser, Subcommand};
 use device_sim::error::Error;
 
-pub use outcome::finish;
+pub use outcome::{finish, parse};
 
 /// Options of every command.
 #[derive(Args)]

@@ -28,7 +28,7 @@ enum Asked {
 }
 
 fn main() -> ExitCode {
-    let parsed = Line::try_parse();
+    let parsed = live::parse::<Line>();
     let is_for_the_whole = match &parsed {
         Ok(line) => matches!(line.command, Some(Asked::Other(_))),
         // The help of all commands; that of one of ours is here.

@@ -1,9 +1,23 @@
-//! The end of a program: help goes to standard output, an error is one line and an exit status, 1
-//! if the request failed, 2 for unusable input.
+//! The beginning and the end of a program: its command line is read; help goes to standard output,
+//! an error is one line and an exit status, 1 if the request failed, 2 for unusable input.
 
 use clap::error::{ContextKind, ContextValue, ErrorKind};
+use clap::{Arg, Command, Parser};
 use device_sim::error::Error;
 use std::process::ExitCode;
+
+/// Reads the command line. Every option takes a negative number, so that what refuses one says the
+/// range and not that `-1` is no option.
+pub fn parse<T: Parser>() -> Result<T, clap::Error> {
+    let signed = |arg: Arg| {
+        let takes_one = arg.get_action().takes_values();
+        arg.allow_negative_numbers(takes_one)
+    };
+    let all_signed = |command: Command| command.mut_args(signed);
+    let mut command = all_signed(T::command()).mut_subcommands(all_signed);
+    let mut matches = command.try_get_matches_from_mut(std::env::args_os())?;
+    T::from_arg_matches_mut(&mut matches).map_err(|error| error.format(&mut command))
+}
 
 /// Carries out a command line that was parsed, and returns the program's exit status.
 pub fn finish<T>(parsed: Result<T, clap::Error>, run: impl FnOnce(T) -> Result<(), Error>) -> ExitCode {

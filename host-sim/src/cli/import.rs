@@ -55,7 +55,7 @@ pub(crate) struct Import {
     #[arg(long, value_name = "J")]
     inertia: Option<f64>,
     /// Force for one unit of command, for rig.toml, N·m or N
-    #[arg(long, value_name = "K", allow_negative_numbers = true)]
+    #[arg(long, value_name = "K")]
     gain: Option<f64>,
     /// Cut every run at this fraction of its length, into fit.csv and holdout.csv
     #[arg(long, value_name = "PART")]

@@ -122,6 +122,8 @@ fn bad_input_is_one_line_and_status_two() {
     refused(&with(&["--model", "magic"]), 2, &["magic"]);
     refused(&with(&["--device", "/dev/no-such-port"]), 2, &["--fast"]);
     refused(&run(&["run", "--headless", "--seconds", "nan"]), 2, &["seconds"]);
+    refused(&run(&["run", "--headless", "--seconds", "-1"]), 2, &["--seconds is -1", "0.0001"]);
+    refused(&run(&["run", "--headless", "--angle", "-5"]), 2, &["--angle is -5", "from 5 to 90"]);
     refused(&run(&["run", "--headless", "--fast"]), 2, &["--seconds"]);
     refused(
         &run(&["run", "--headless", "--seconds", "1", "--device", "/dev/no-such-port"]),
