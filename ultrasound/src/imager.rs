@@ -3,21 +3,18 @@
 //! All in baseband (in-phase and quadrature), a line of samples at a time, in arrays that the
 //! processor can work on four at once; nothing but a line's first crossings allocates.
 
-use crate::medium::{ASSUMED_SPEED, Medium, STEEL, VESSEL_WALL};
-use crate::plane::{Crossing, Mesh, cut};
+use crate::line::{follow_line, meet};
+use crate::medium::STEEL;
+use crate::plane::{Crossing, cut};
 use crate::probe::{Axes, Probe, Shaft};
+use crate::pulse::{along, bell, decibels, pulse_gain, pulse_sigma_mm};
+use crate::scene::{LINES, SAMPLES, Scene};
 use crate::score::InPlane;
-
-/// Lines of an image.
-pub const LINES: usize = 256;
-/// Samples of a line.
-pub const SAMPLES: usize = 1024;
+use crate::speckle::{column_start, scatterers};
 
 /// Planes that the thickness of the beam is made of: how far beside the image's (standard
 /// deviations), and their weight.
 const PLANES: [(f32, f32); 3] = [(-1.0, 0.25), (0.0, 0.5), (1.0, 0.25)];
-/// Speckle of muscle against full reflection, dB.
-const MUSCLE_SPECKLE_DB: f32 = -38.0;
 /// A rough interface sends a share of its echo everywhere; the rest only where it faces the probe.
 const ROUGH: f32 = 0.15;
 /// The power of the cosine by which the smooth part depends on the angle of incidence.
@@ -31,23 +28,10 @@ const REVERBERATIONS: usize = 3;
 const REVERBERATION: f32 = 0.2;
 /// Depth of the shadow under a needle in the middle of the beam.
 const SHADOW: f32 = 0.85;
-/// Scatterers that columns are cut from.
-const NOISE: usize = 1 << 16;
 /// Distance beside the plane over which the speckle changes, mm.
 const COHERENCE_MM: f32 = 0.6;
 /// Turn of the probe over which the speckle changes, rad.
 const COHERENCE_RAD: f32 = 0.05;
-
-/// The scene to image.
-#[derive(Clone, Copy, Debug)]
-pub struct Scene<'a> {
-    /// The medium above the first interface; gel counts as skin.
-    pub first: Medium,
-    /// Interfaces.
-    pub meshes: &'a [Mesh<'a>],
-    /// The needle, where there is one.
-    pub shaft: Option<Shaft>,
-}
 
 /// The settings of the machine.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -296,197 +280,5 @@ impl Imager {
                 *grey = (db * scale).clamp(0.0, 255.0) as u8;
             }
         }
-    }
-}
-
-/// A stretch of a line in one medium.
-struct Piece {
-    from: usize,
-    to: usize,
-    /// Pressure that has reached its beginning and comes back, as a share of what was sent.
-    pressure: f32,
-    /// The share of the amplitude that remains after a sample, there and back.
-    decay: f32,
-    /// Energy of the scatterers.
-    speckle: f32,
-    /// Pressure of the echo of the interface above it, and how much that faces the probe.
-    echo: Option<(f32, f32)>,
-}
-
-/// Goes down a line from medium to medium. Depths become those that the machine shows, which takes
-/// 1540 m/s for all.
-fn follow_line(probe: &Probe, scene: &Scene<'_>, crossings: &[Crossing], mut take: impl FnMut(Piece)) {
-    let sample_mm = probe.depth_mm / SAMPLES as f32;
-    let mut layer = scene.first;
-    // A bit for each closed mesh that the line is in; where they overlap, the last one counts.
-    let mut inside = 0_u64;
-    let (mut depth, mut shown, mut pressure) = (0.0_f32, 0.0_f32, 1.0_f32);
-    let mut medium = layer;
-    let mut echo: Option<(f32, f32)> = None;
-    let bottom = 2.0 * probe.depth_mm;
-    for crossing in crossings.iter().map(Some).chain([None]) {
-        let end = crossing.map_or(bottom, |crossing| crossing.depth);
-        let long = end - depth;
-        if long > 0.0 {
-            let from = shown;
-            shown += long * ASSUMED_SPEED / medium.speed;
-            let [first, last] = [from, shown].map(|mm| ((mm / sample_mm) as usize).min(SAMPLES));
-            // A sample shown is so long in truth, and passed twice.
-            let decay = medium.attenuated(probe.mhz, 2.0 * sample_mm * medium.speed / ASSUMED_SPEED);
-            let speckle = 10_f32.powf(0.1 * (MUSCLE_SPECKLE_DB + medium.speckle_db));
-            take(Piece { from: first, to: last, pressure, decay, speckle, echo: echo.take() });
-            pressure *= medium.attenuated(probe.mhz, 2.0 * long);
-            depth = end;
-        }
-        let Some(crossing) = crossing else { return };
-        if shown >= probe.depth_mm {
-            return;
-        }
-        let mesh = &scene.meshes[crossing.mesh];
-        match mesh.wall_mm {
-            Some(_) => inside ^= 1_u64.unbounded_shl(crossing.mesh as u32),
-            None => layer = mesh.behind,
-        }
-        let innermost = inside.checked_ilog2().and_then(|number| scene.meshes.get(number as usize));
-        let next = innermost.map_or(layer, |mesh| mesh.behind);
-        let has_wall = mesh.wall_mm.is_some_and(|mm| mm > 0.0);
-        if !has_wall && next == medium {
-            // A surface under another: nothing changes there.
-            continue;
-        }
-        // A vessel's wall stands out from both sides.
-        let met = if has_wall { VESSEL_WALL } else { next };
-        let reflected = medium.pressure_reflection(&met);
-        let wall = if has_wall { met.pressure_reflection(&next) } else { 0.0 };
-        let back = reflected.abs().max(wall.abs());
-        echo = Some((pressure * back, crossing.facing));
-        // There and back: (1 − R) of the intensity passes each interface each time.
-        pressure *= (1.0 - reflected * reflected) * (1.0 - wall * wall);
-        medium = next;
-    }
-}
-
-/// Returns where the beam of a line meets the needle: depth, share of the beam's pressure there,
-/// distance behind the tip.
-fn meet(
-    probe: &Probe,
-    lateral: f32,
-    tip: [f32; 3],
-    ahead: [f32; 3],
-    shaft: &Shaft,
-) -> Option<(f32, f32, f32)> {
-    let beam = (0.6 * 1.54 / probe.mhz).max(shaft.radius_mm);
-    let mut sigma = probe.beam_sigma_mm(tip[1]);
-    let mut met = None;
-    // The thickness depends on the depth, which depends on where it is met.
-    for _ in 0..2 {
-        let (du, dn) = ((tip[0] - lateral) / beam, tip[2] / sigma);
-        let (au, an) = (ahead[0] / beam, ahead[2] / sigma);
-        let square = au * au + an * an;
-        let behind =
-            if square > 1e-9 { ((du * au + dn * an) / square).clamp(0.0, shaft.inserted_mm) } else { 0.0 };
-        let (u, n) = (du - behind * au, dn - behind * an);
-        let depth = tip[1] - behind * ahead[1];
-        met = Some((depth, (-0.5 * (u * u + n * n)).exp(), behind));
-        sigma = probe.beam_sigma_mm(depth);
-    }
-    met
-}
-
-/// Standard deviation of the pulse's envelope, two periods long.
-fn pulse_sigma_mm(probe: &Probe) -> f32 {
-    1.54 / probe.mhz / 2.354_82
-}
-
-/// Returns the gain that makes up for what a single echo loses when it is spread over the pulse.
-fn pulse_gain(probe: &Probe) -> f32 {
-    (pulse_sigma_mm(probe) / (probe.depth_mm / SAMPLES as f32)).max(1.0).sqrt()
-}
-
-/// Half of a bell curve whose squares, both sides together, sum to 1: it keeps the energy of noise.
-fn bell<const TAPS: usize>(sigma: f32) -> [f32; TAPS] {
-    let mut taps = [0.0; TAPS];
-    for (tap, slot) in taps.iter_mut().enumerate() {
-        *slot = (-0.5 * (tap as f32 / sigma.max(0.05)).powi(2)).exp();
-    }
-    let sum: f32 = taps.iter().enumerate().map(|(tap, w)| w * w * if tap == 0 { 1.0 } else { 2.0 }).sum();
-    taps.map(|weight| weight / sum.sqrt())
-}
-
-/// Convolves a line with a symmetric kernel.
-fn along<const TAPS: usize>(source: &[f32], out: &mut [f32], taps: &[f32; TAPS]) {
-    let count = source.len();
-    for (out, value) in out.iter_mut().zip(source) {
-        *out = taps[0] * value;
-    }
-    for (tap, weight) in taps.iter().enumerate().skip(1) {
-        for ((out, before), after) in out[tap..count - tap].iter_mut().zip(source).zip(&source[2 * tap..]) {
-            *out += weight * (before + after);
-        }
-        for edge in 0..tap {
-            out[edge] += weight * source[edge + tap];
-            out[count - 1 - edge] += weight * source[count - 1 - edge - tap];
-        }
-    }
-}
-
-/// 10·log₁₀ by the exponent and a parabola in the mantissa: within 0.03 dB.
-#[inline]
-fn decibels(power: f32) -> f32 {
-    let bits = power.max(1e-30).to_bits();
-    let exponent = (bits >> 23) as i32 - 127;
-    let mantissa = f32::from_bits((bits & 0x007F_FFFF) | 0x3F80_0000);
-    let log2 = exponent as f32 + (-0.344_845 * mantissa + 2.024_658) * mantissa - 1.674_873;
-    3.010_3 * log2
-}
-
-/// Returns where the column of scatterers begins that lies at a place of the body.
-fn column_start(column: i64, cell: i64, turned: i64) -> usize {
-    let mut mixed = (column as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15)
-        ^ (cell as u64).wrapping_mul(0xC2B2_AE3D_27D4_EB4F)
-        ^ (turned as u64).wrapping_mul(0x1656_67B1_9E37_79F9);
-    mixed = (mixed ^ (mixed >> 29)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    ((mixed >> 20) as usize) % (NOISE - SAMPLES)
-}
-
-/// In-phase and quadrature of scatterers: two Gaussian numbers each (Box and Muller), of variance a
-/// half.
-fn scatterers(seed: u64) -> [Vec<f32>; 2] {
-    let mut state = seed;
-    let mut unit = || {
-        // SplitMix64: the same on every machine.
-        state = state.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = state;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        ((z ^ (z >> 31)) >> 40) as f32 / (1_u32 << 24) as f32
-    };
-    let mut parts = [Vec::with_capacity(NOISE), Vec::with_capacity(NOISE)];
-    for _ in 0..NOISE {
-        let radius = (-(1.0 - unit()).ln()).sqrt();
-        let (sine, cosine) = (std::f32::consts::TAU * unit()).sin_cos();
-        parts[0].push(radius * cosine);
-        parts[1].push(radius * sine);
-    }
-    parts
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_quick_logarithm_is_near_the_true_one() {
-        for step in 0..2_000 {
-            let power = 10_f32.powf(-12.0 + 0.007 * step as f32);
-            assert!((decibels(power) - 10.0 * power.log10()).abs() < 0.05, "{power}");
-        }
-    }
-
-    #[test]
-    fn bells_keep_the_energy_of_noise() {
-        let taps = bell::<6>(2.3);
-        let energy: f32 = taps[0].powi(2) + 2.0 * taps[1..].iter().map(|w| w * w).sum::<f32>();
-        assert!((energy - 1.0).abs() < 1e-5);
     }
 }

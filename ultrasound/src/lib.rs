@@ -12,13 +12,18 @@
 #![forbid(unsafe_code)]
 
 pub mod imager;
+mod line;
 pub mod medium;
 pub mod plane;
 pub mod probe;
+mod pulse;
+pub mod scene;
 pub mod score;
+mod speckle;
 
-pub use imager::{Imager, LINES, Look, SAMPLES, Scene};
+pub use imager::{Imager, Look};
 pub use medium::Medium;
 pub use plane::Mesh;
 pub use probe::{Probe, Shaft};
+pub use scene::{LINES, SAMPLES, Scene};
 pub use score::{InPlane, InPlaneScore};
