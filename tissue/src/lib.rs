@@ -17,6 +17,7 @@ pub(crate) mod constraint;
 mod lattice;
 pub mod needle;
 pub mod push;
+mod shaft;
 pub mod solver;
 mod tube;
 pub mod vector;

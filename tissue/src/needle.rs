@@ -7,12 +7,13 @@
 //! bounded.
 
 use crate::constraint::{Anchor, Point, place};
-use crate::vector::{Vector, add, cross, direction, dot, is_finite, length, scale, sub};
+use crate::shaft::Hold;
+use crate::vector::{Vector, cross, dot, length, scale, sub};
+
+pub use crate::shaft::Needle;
 
 /// A held place that would be pulled farther aside than this lets go and is taken hold of anew, mm.
 pub(crate) const TEAR_MM: f32 = 3.0;
-/// Tissue springs back after a puncture with this time constant, s.
-const RECOVERY_S: f32 = 0.08;
 /// Distance between the places along the shaft where tissue is held, mm.
 const SHAFT_MM: f32 = 1.2;
 /// Most places held along the shaft.
@@ -22,34 +23,6 @@ const MOST_HOLDS: usize = 48;
 const LATE_MM: f32 = 2.0;
 /// The length back along the needle over which a wall is looked for, mm.
 const NEEDLE_MM: f32 = 80.0;
-
-/// A rigid needle.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Needle {
-    /// The position of its tip, mm.
-    pub tip: Vector,
-    /// Its direction, of length 1.
-    pub direction: Vector,
-}
-
-impl Needle {
-    /// Its tip `depth_mm` past the entry point (the origin) along an axis `angle` rad below the
-    /// skin, turned `azimuth` rad about the vertical through the entry. What is no number is 0.
-    pub fn entering(depth_mm: f32, angle: f32, azimuth: f32) -> Self {
-        let number = |value: f32| if value.is_finite() { value } else { 0.0 };
-        let (sine, cosine) = number(angle).sin_cos();
-        let (side, ahead) = number(azimuth).sin_cos();
-        let direction = [cosine * ahead, cosine * side, sine];
-        Self { tip: scale(direction, number(depth_mm).clamp(-500.0, 500.0)), direction }
-    }
-
-    /// The needle as it can be used: finite, its direction of length 1.
-    pub(crate) fn checked(self) -> Option<Self> {
-        let direction = direction(self.direction)?;
-        (is_finite(self.tip) && self.tip.iter().all(|c| c.abs() < 1e4))
-            .then_some(Self { tip: self.tip, direction })
-    }
-}
 
 /// The state of a wall towards the needle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -82,53 +55,6 @@ pub enum WallName {
     Near,
     /// The vessel's wall on the other side.
     Far,
-}
-
-/// A place held to the needle.
-#[derive(Clone, Copy, Debug)]
-struct Hold {
-    anchor: Anchor,
-    /// Its position at rest, mm.
-    home: Vector,
-    /// The travel by which it is dragged along the needle, mm.
-    drag: f32,
-    /// The largest such travel, mm.
-    most: f32,
-}
-
-impl Hold {
-    fn new(anchor: Anchor, rest: &[Point], needle: &Needle, most: f32, drag_limit: f32) -> Self {
-        let home = anchor.place(rest);
-        let pushed = dot(sub(needle.tip, home), needle.direction);
-        Self { anchor, home, drag: pushed.clamp(-drag_limit, drag_limit), most }
-    }
-
-    /// Returns the point on the needle's axis that it belongs to, and its distance from that point
-    /// across the axis.
-    fn target(&self, needle: &Needle) -> (Vector, f32) {
-        let along = dot(sub(self.home, needle.tip), needle.direction);
-        let on_axis = add(needle.tip, scale(needle.direction, along));
-        (add(on_axis, scale(needle.direction, self.drag)), length(sub(on_axis, self.home)))
-    }
-
-    /// Static friction carries it along with the needle until it slips.
-    fn follow(&mut self, advance: f32, dt: f32) {
-        if self.drag.abs() > self.most {
-            // What the wall was pushed in before it gave way springs back.
-            let beyond = self.drag - self.most.copysign(self.drag);
-            self.drag -= beyond * (1.0 - (-dt / RECOVERY_S).exp());
-            if advance * self.drag < 0.0 {
-                self.drag += advance.clamp(-2.0 * self.most, 2.0 * self.most);
-            }
-        } else {
-            self.drag = (self.drag + advance).clamp(-self.most, self.most);
-        }
-    }
-
-    /// The tip has been drawn out of it.
-    fn is_left(&self, needle: &Needle) -> bool {
-        dot(sub(self.home, needle.tip), needle.direction) + self.drag.min(0.0) > 0.05
-    }
 }
 
 /// A surface that the needle has to pass.

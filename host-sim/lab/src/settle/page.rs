@@ -1,6 +1,7 @@
 //! The inputs of each round and the reasons for them, as `settle.json` and a page.
 
-use super::{Feel, Name, Round, Settled, effect_in_words};
+use super::settled::effect_in_words;
+use super::{Feel, Name, Round, Settled};
 use crate::compensate::felt::Felt;
 use device_sim::error::Error;
 use html_report::{Cell, Sheet};
