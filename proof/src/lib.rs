@@ -22,6 +22,8 @@ mod metrics;
 mod options;
 mod pool;
 mod report;
+mod report_json;
+mod report_machines;
 mod report_residuals;
 mod rng;
 mod scratch;
@@ -107,14 +109,14 @@ fn judge_folder(options: &Options, top: &Path, tool: &dyn Tool) -> Result<(), St
         (
             report::terminal(&judged.records, &metrics, &run),
             report::markdown(&judged.records, &metrics, &run),
-            report::json(&judged.records, &metrics, &run),
+            report_json::as_json(&judged.records, &metrics, &run),
         )
     } else {
         let metrics = machines::sum(&judged.machines);
         (
-            report::machines_terminal(&judged.machines, &metrics, &run),
-            report::machines_markdown(&judged.machines, &metrics, &run),
-            report::machines_json(&judged.machines, &metrics, &run),
+            report_machines::terminal(&judged.machines, &metrics, &run),
+            report_machines::markdown(&judged.machines, &metrics, &run),
+            report_machines::as_json(&judged.machines, &metrics, &run),
         )
     };
     print!("{text}");
@@ -153,7 +155,7 @@ fn prove(options: &Options, specs: &[Spec], tool: &dyn Tool) -> Result<(), Strin
     };
     let metrics = metrics::sum(&records);
     print!("{}", report::terminal(&records, &metrics, &run));
-    write_out(options, "proof.json", &pretty(&report::json(&records, &metrics, &run))?)?;
+    write_out(options, "proof.json", &pretty(&report_json::as_json(&records, &metrics, &run))?)?;
     write_out(options, "proof.md", &report::markdown(&records, &metrics, &run))?;
     write_out(options, "proof-aggregate.md", &report::aggregate(&records, &metrics, &run))?;
     if options.quick && options.only.is_none() { gate(&metrics) } else { Ok(()) }

@@ -4,14 +4,10 @@
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
-use serde_json::{Value, json};
-
 use crate::judge::Record;
-use crate::machines::{Machine, MachineSums};
 use crate::metrics::{Metrics, Reliability, share_text};
 use crate::options::Options;
-use crate::stats::{Rate, quantile};
-use crate::tool::Weighed;
+use crate::stats::Rate;
 
 /// The tool's time for 60 s at 10 kHz of some hidden physics.
 #[derive(Clone, Debug)]
@@ -55,7 +51,7 @@ fn rows(s: &Metrics, run: &Run) -> Vec<[String; 3]> {
     list
 }
 
-fn table(out: &mut String, head: &[&str], rows: impl IntoIterator<Item = Vec<String>>) {
+pub(crate) fn table(out: &mut String, head: &[&str], rows: impl IntoIterator<Item = Vec<String>>) {
     let _ = writeln!(out, "| {} |", head.join(" | "));
     let _ = writeln!(out, "|{}", " --- |".repeat(head.len()));
     for row in rows {
@@ -68,7 +64,7 @@ fn count(r: &Rate) -> String {
     if r.trials == 0 { "–".into() } else { format!("{}/{}", r.hits, r.trials) }
 }
 
-fn head(records: usize, run: &Run) -> String {
+pub(crate) fn head(records: usize, run: &Run) -> String {
     let cut = if records + run.unbuilt < run.planned {
         format!(" of {} planned, in an order that says nothing, stopped by --minutes", run.planned)
     } else {
@@ -81,10 +77,10 @@ fn head(records: usize, run: &Run) -> String {
 }
 
 /// A section of the report: its title, the names of its columns, its rows.
-struct Section {
-    title: &'static str,
-    columns: Vec<&'static str>,
-    rows: Vec<Vec<String>>,
+pub(crate) struct Section {
+    pub(crate) title: &'static str,
+    pub(crate) columns: Vec<&'static str>,
+    pub(crate) rows: Vec<Vec<String>>,
 }
 
 /// Returns the sections below the main table, for every output.
@@ -133,7 +129,7 @@ fn sections(s: &Metrics) -> Vec<Section> {
     list
 }
 
-fn reliability(r: &Reliability) -> Section {
+pub(crate) fn reliability(r: &Reliability) -> Section {
     let mut rows: Vec<Vec<String>> = Vec::new();
     for (i, bin) in r.bins.iter().enumerate() {
         let Some(mean) = bin.mean() else { continue };
@@ -212,7 +208,7 @@ pub(crate) fn markdown(records: &[Record], s: &Metrics, run: &Run) -> String {
     out
 }
 
-fn columns(out: &mut String, rows: &[Vec<String>]) {
+pub(crate) fn columns(out: &mut String, rows: &[Vec<String>]) {
     let count = rows.first().map_or(0, Vec::len);
     let width: Vec<usize> =
         (0..count).map(|i| rows.iter().map(|r| r[i].chars().count()).max().unwrap_or(0)).collect();
@@ -277,78 +273,6 @@ fn matrix(s: &Metrics) -> String {
     out
 }
 
-fn weighed_json((weighed, right): (&Weighed, bool)) -> Value {
-    json!({ "name": weighed.name, "right": right, "evidence": weighed.evidence })
-}
-
-fn case_json(r: &Record) -> Value {
-    let effects: Vec<Value> = r
-        .effects()
-        .iter()
-        .map(|e| json!({ "name": e.name, "class": e.class, "confidence": e.confidence, "right": r.is_true(e) }))
-        .collect();
-    let (gain, left) = (r.gain(), r.left.as_ref().ok());
-    json!({
-        "id": r.id, "kind": r.key.category.word(), "hidden": r.key.hidden(), "strength": r.key.strength,
-        "snr": r.key.snr, "rig": r.key.rig, "right": r.right(), "verdict": r.verdict(), "effects": effects,
-        "answer": r.answer_text(), "refit": left.map(|l| l.refit), "patched": left.map(|l| l.patched), "unjudged": r.left.as_ref().err(),
-        "reported_gain_over_oracle": r.reported_gain().map(|g| g.of_oracle),
-        "gain": gain,
-        "seconds": r.seconds, "weighed": r.weighed().map(weighed_json).collect::<Vec<_>>(),
-    })
-}
-
-/// The whole result as JSON: sums, and one entry for every case.
-pub(crate) fn json(records: &[Record], s: &Metrics, run: &Run) -> Value {
-    let lines: serde_json::Map<String, Value> =
-        s.lines.iter().map(|l| (l.key.clone(), l.figure.json())).collect();
-    let by = |rates: &[Rate]| json!(rates.iter().map(Rate::json).collect::<Vec<_>>());
-    let by_effect: serde_json::Map<String, Value> =
-        s.by_effect.iter().map(|(n, r)| (n.clone(), by(r))).collect();
-    let by_unknown: Vec<Value> = s
-        .by_unknown
-        .iter()
-        .map(|((detector, name), r)| {
-            json!({ "kind": name, "detector": detector, "abstained": r[0].json(), "confidently_wrong": r[1].json() })
-        })
-        .collect();
-    let rivals: Vec<Value> = s
-        .rivals
-        .iter()
-        .map(|r| {
-            json!({
-                "name": r.name,
-                "right": by(&r.right),
-                "null_alarms": r.null_alarms.json(),
-                "parameters_called_physics": r.parameters_called_physics.json(),
-                "false_names": r.false_names.json(),
-                "outside_abstains": r.outside_abstains.json(),
-                "gain": { "median": quantile(&r.shares, 0.5), "p10": quantile(&r.shares, 0.1), "cases": r.shares.len() },
-            })
-        })
-        .collect();
-    let times: Option<serde_json::Map<String, Value>> =
-        run.speed.as_ref().map(|times| times.iter().map(|t| (t.hidden.into(), json!(t.seconds))).collect());
-    json!({
-        "format": 2,
-        "tool": run.tool,
-        "source": run.source,
-        "seed": run.options.seed,
-        "quick": run.options.quick,
-        "draws": run.options.draws(),
-        "only": run.options.only,
-        "planned": run.planned,
-        "unbuilt": run.unbuilt,
-        "figures": lines,
-        "by_effect": by_effect,
-        "by_unknown": by_unknown,
-        "reliability": s.reliability.json(),
-        "seconds_60s_10khz": times,
-        "rivals": rivals,
-        "cases": records.iter().map(case_json).collect::<Vec<_>>(),
-    })
-}
-
 /// Returns the part that the tool's author may see: sums and confusion, nothing of single cases.
 pub(crate) fn aggregate(records: &[Record], s: &Metrics, run: &Run) -> String {
     let full = markdown(records, s, run);
@@ -365,62 +289,4 @@ pub(crate) fn aggregate(records: &[Record], s: &Metrics, run: &Run) -> String {
         counts.iter().map(|((c, v), n)| vec![c.word().into(), v.clone(), n.to_string()]),
     );
     out
-}
-
-fn machine_rows(machines: &[Machine]) -> Vec<Vec<String>> {
-    machines
-        .iter()
-        .map(|m| {
-            vec![
-                m.record.id.clone(),
-                m.outcome().word().into(),
-                m.belief.wanted(),
-                m.record.answer_text().replace('|', "/"),
-                m.belief.source.clone(),
-            ]
-        })
-        .collect()
-}
-
-const MACHINE: [&str; 5] = ["case", "judged", "right would be", "answer (confidence)", "belief and source"];
-
-/// Real machines as markdown.
-pub(crate) fn machines_markdown(machines: &[Machine], s: &MachineSums, run: &Run) -> String {
-    let mut out = head(machines.len(), run) + "\n\n";
-    table(&mut out, &["measure", "wanted", "measured"], s.rows().into_iter().map(|r| r.to_vec()));
-    let section = reliability(&s.reliability);
-    let _ = writeln!(out, "### {}\n", section.title);
-    table(&mut out, &section.columns, section.rows);
-    out.push_str("### Every case\n\n");
-    table(&mut out, &MACHINE, machine_rows(machines));
-    out
-}
-
-/// Real machines for the terminal; the belief's source is left to the file.
-pub(crate) fn machines_terminal(machines: &[Machine], s: &MachineSums, run: &Run) -> String {
-    let mut out = head(machines.len(), run) + "\n\n";
-    columns(&mut out, &s.rows().iter().map(|r| r.to_vec()).collect::<Vec<_>>());
-    let section = reliability(&s.reliability);
-    let _ = writeln!(out, "\n{}", section.title);
-    columns(&mut out, &section.rows);
-    out.push_str("\nevery case\n");
-    let rows: Vec<Vec<String>> = machine_rows(machines).into_iter().map(|r| r[..4].to_vec()).collect();
-    columns(&mut out, &rows);
-    out
-}
-
-/// Real machines as JSON.
-pub(crate) fn machines_json(machines: &[Machine], s: &MachineSums, run: &Run) -> Value {
-    let cases: Vec<Value> = machines
-        .iter()
-        .map(|m| {
-            let mut case = case_json(&m.record);
-            case["outcome"] = json!(m.outcome().word());
-            case["wanted"] = json!(m.belief.wanted());
-            case
-        })
-        .collect();
-    json!({
-        "format": 2, "tool": run.tool, "source": run.source, "machines": s.json(), "cases": cases,
-    })
 }

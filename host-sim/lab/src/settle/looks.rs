@@ -2,7 +2,7 @@
 //! one diagnosis of twenty comes up in one run of four, if the run may stop at the first of five
 //! diagnoses that gives it.
 
-use super::Name;
+use super::name::Name;
 
 /// Confidence below which a diagnosis names nothing.
 const LEAST: f64 = 2.0 / 3.0;

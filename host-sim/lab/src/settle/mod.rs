@@ -6,6 +6,7 @@ mod feel;
 mod following;
 mod kept;
 mod looks;
+mod name;
 mod page;
 mod patched;
 mod play;
@@ -13,7 +14,8 @@ mod settled;
 mod subject;
 
 pub use feel::Feel;
-pub use settled::{Name, Round, Settled};
+pub use name::Name;
+pub use settled::{Round, Settled};
 pub use subject::Subject;
 
 use crate::characterise::programme::{Programme, programmes};

@@ -1,6 +1,6 @@
 //! The inputs of each round and the reasons for them, as `settle.json` and a page.
 
-use super::settled::effect_in_words;
+use super::name::effect_in_words;
 use super::{Feel, Name, Round, Settled};
 use crate::compensate::felt::Felt;
 use device_sim::error::Error;

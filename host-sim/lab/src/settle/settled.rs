@@ -1,8 +1,8 @@
-//! What a run has played and named so far.
+//! The rounds of a run and the names that it ends with.
 
 use super::feel::Feel;
 use super::looks;
-use diagnosis::effects::EffectName;
+use super::name::Name;
 
 /// One round.
 #[derive(Clone, Debug)]
@@ -22,31 +22,6 @@ pub struct Round {
     /// Names after the diagnosis of all recordings so far, with the confidence of that diagnosis
     /// alone.
     pub names: Vec<Name>,
-}
-
-/// A named effect.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Name {
-    /// Its name.
-    pub name: String,
-    /// Names that the recordings cannot tell from it, itself included.
-    pub class: Vec<String>,
-    /// Probability that the class holds the truth; in the outcome of a run, with all its looks
-    /// counted.
-    pub confidence: f64,
-}
-
-impl Name {
-    /// Returns its class in the words of the report.
-    pub fn in_words(&self) -> String {
-        let words: Vec<&str> = self.class.iter().map(|name| effect_in_words(name)).collect();
-        words.join(" or ")
-    }
-}
-
-/// Returns the words of the report for an effect's name, or the name itself if it has none.
-pub(super) fn effect_in_words(name: &str) -> &str {
-    EffectName::find(name).map_or(name, |effect| effect.in_words())
 }
 
 /// The outcome.
