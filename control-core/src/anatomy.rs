@@ -15,18 +15,19 @@
 //! band; a layer that was touched is left only 0.2 mm further out. Noise of a milliradian therefore
 //! makes no layer come and go: at 15° it moves a vein by 0.07 mm.
 
+mod layers;
+
+pub(crate) use layers::{
+    Anatomy, LARGEST_ANGLE, Layer, Passage, SMALLEST_ANGLE, Vessel, Wall, is_vessel_wall,
+};
+
 use crate::event::{Transitions, VesselState};
 use crate::math::{reciprocal, sine, truncating_product};
-use crate::tissue::{MAX_LAYERS, Tissue};
+use crate::tissue::MAX_LAYERS;
 use crate::units::{Millimetres, Milliradians};
 use fixed::types::{I2F30, I8F24, I16F16};
-use heapless::Vec;
+use layers::Angle;
 
-/// The smallest angle to the skin that is distinguished: 5°. Below it, layers stay where they are
-/// met at 5°.
-pub(crate) const SMALLEST_ANGLE: Milliradians = Milliradians(87);
-/// Straight in.
-pub(crate) const LARGEST_ANGLE: Milliradians = Milliradians(1_571);
 /// A layer is left when the tip is this far outside it: 0.2 mm along the needle, so that a tremor
 /// does not heal a wall.
 const EXIT_DISTANCE: I16F16 = I16F16::from_bits(13_107);
@@ -37,83 +38,6 @@ pub(crate) const LOOK_TICKS: u32 = 16;
 const SMOOTHING: u32 = 5;
 /// The angle follows what is smoothed once it is this far off: 0.75 mrad in Q16.
 const DEAD_BAND: u32 = 49_152;
-
-/// One layer that the tip can meet. Outermost first, each deeper than the one before.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Layer {
-    /// Its number in the configuration.
-    pub(crate) number: u8,
-    /// Perpendicular to the skin.
-    pub(crate) depth: Millimetres,
-    /// Walls in the layers above.
-    pub(crate) walls_above: usize,
-    /// It begins with a wall that gives way.
-    pub(crate) has_wall: bool,
-    /// A bit where the law of force decides that it gives way, else nothing.
-    pub(crate) opens: u8,
-}
-
-/// The travel at which a wall gives way, and its springing back.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Wall {
-    /// The layer that begins with it.
-    pub(crate) layer: usize,
-    /// Travel past contact, along the needle.
-    pub(crate) puncture: I16F16,
-    /// Travel past contact at which nothing is left of it.
-    pub(crate) relieved: I16F16,
-    /// The remaining indentation when it has just given way.
-    pub(crate) left: I16F16,
-    /// `left / (left + relieved − puncture)`, below 1: see [`Insertion::carried_along`].
-    pub(crate) share: I2F30,
-}
-
-/// The condition for the tip to be past the wall of a layer, or in the layer if it has none.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Passage {
-    /// The layer.
-    pub(crate) layer: usize,
-    /// The number of walls that have given way.
-    pub(crate) given: usize,
-    /// A bit of the layers that have given way by the law of force, or nothing.
-    pub(crate) opens: u8,
-}
-
-impl Passage {
-    /// Past layer number `layer`, which is `met`.
-    pub(crate) fn of(layer: usize, met: &Layer) -> Self {
-        Self { layer, given: if met.has_wall { met.walls_above + 1 } else { 0 }, opens: met.opens }
-    }
-}
-
-/// A vessel among the layers.
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum Vessel {
-    /// Its near and its far wall.
-    Met { near: Passage, far: Option<Passage> },
-    /// The needle passes beside it from this depth on, perpendicular to the skin.
-    Beside { depth: Millimetres },
-}
-
-/// The anatomy ready for the tick. [`crate::plan`] has checked it.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Anatomy {
-    pub(crate) layers: Vec<Layer, MAX_LAYERS>,
-    pub(crate) walls: Vec<Wall, MAX_LAYERS>,
-    pub(crate) vessel: Option<Vessel>,
-    /// The sensor's tilt with the needle laid on the skin.
-    pub(crate) skin_tilt: i16,
-}
-
-/// The angle to the skin at which the layers are met.
-#[derive(Clone, Copy, Debug)]
-struct Angle {
-    taken: Milliradians,
-    /// 1/sin of what is taken: length along the needle for each length perpendicular to the skin.
-    path_per_depth: I8F24,
-    /// Its sine, the other way round.
-    depth_per_path: I2F30,
-}
 
 /// A new angle on its way, a part in each of four ticks: all of it in one would make that tick the
 /// longest of all.
@@ -465,23 +389,4 @@ impl Insertion {
         transitions.flashback |= state == VesselState::InLumen && self.vessel != VesselState::InLumen;
         self.vessel = state;
     }
-}
-
-impl Angle {
-    /// Along the needle, for a depth perpendicular to the skin of up to 2,000 mm.
-    fn along(&self, depth: Millimetres) -> I16F16 {
-        I16F16::from_bits(truncating_product(depth.0.to_bits(), self.path_per_depth.to_bits(), 24))
-    }
-}
-
-impl Anatomy {
-    /// The angle to the skin at a measured tilt, within what is distinguished.
-    fn angle(&self, tilt: Milliradians) -> Milliradians {
-        Milliradians(tilt.0.saturating_sub(self.skin_tilt).clamp(SMALLEST_ANGLE.0, LARGEST_ANGLE.0))
-    }
-}
-
-/// True if the tissue is a wall of a vessel.
-pub(crate) fn is_vessel_wall(tissue: Tissue) -> bool {
-    matches!(tissue, Tissue::Vessel | Tissue::FarWall)
 }
