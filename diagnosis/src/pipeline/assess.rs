@@ -13,12 +13,13 @@ use crate::selection::context::FittedModel;
 use crate::selection::excitation::Excitation;
 use crate::thresholds::MATERIAL;
 use crate::validation::comparison::Shown;
-use crate::validation::confidence_pass::{Scales, WeighedModel, weigh};
+use crate::validation::confidence_pass::{Scales, weigh};
 use crate::validation::free_form_check::{self, FreeFormShare, Unnamed};
 use crate::validation::holdout_set::HoldoutSet;
 use crate::validation::out_of_library::{self, Foreign};
 use crate::validation::parameters;
 use crate::validation::second_selection;
+use crate::validation::weighed_model::WeighedModel;
 
 /// Everything that the decision rests on.
 pub(crate) struct Assessment {

@@ -10,7 +10,7 @@ use crate::estimation::model::Model;
 use crate::estimation::noise::Colour;
 use crate::selection::context::{FitContext, FittedModel};
 use crate::thresholds::MOST_IN_CLASS;
-use crate::validation::confidence_pass::{WeighedEffect, WeighedModel};
+use crate::validation::weighed_model::{WeighedEffect, WeighedModel};
 
 /// Rivals beyond this many standard errors behind are out.
 const OUT_Z: f64 = 4.0;

@@ -23,7 +23,6 @@ use crate::selection::context::FittedModel;
 use crate::selection::untested::{self, NotTested};
 use crate::validation::comparison::Shown;
 use crate::validation::confidence;
-use crate::validation::confidence_pass::{WeighedEffect, WeighedModel};
 use crate::validation::free_form_check::{FreeFormShare, Unnamed};
 use crate::validation::known_travel;
 use crate::validation::parameters;
@@ -31,6 +30,7 @@ use crate::validation::plain_regression::{self, Left};
 use crate::validation::rejection::Rejection;
 use crate::validation::residual_maps::{self, Map};
 use crate::validation::residuals::{Residuals, above};
+use crate::validation::weighed_model::{WeighedEffect, WeighedModel};
 
 /// Decides what is named; `holdout` are the held-out recordings as they were read, `rate_hz` the
 /// rows a second of the slowest one.

@@ -9,9 +9,9 @@ use crate::io::schema::Verdict;
 use crate::selection::excitation::Excitation;
 use crate::thresholds::{MATERIAL, UNDERSTOOD};
 use crate::validation::comparison::Shown;
-use crate::validation::confidence_pass::WeighedModel;
 use crate::validation::residual_maps::Map;
 use crate::validation::residuals::{above, refit_matters};
+use crate::validation::weighed_model::WeighedModel;
 
 /// Part of the force that must be left, on every recording, to say that the rig's model does not
 /// speak of these recordings.

@@ -6,11 +6,11 @@ use crate::estimation::model::Model;
 use crate::estimation::noise::Colour;
 use crate::selection::context::{FitContext, FittedModel};
 use crate::selection::free_form::{Evaluator, Shape, Taken, is_told};
-use crate::validation::confidence_pass::WeighedModel;
 use crate::validation::effect_evidence::gather_evidence;
 use crate::validation::holdout_set::HoldoutSet;
 use crate::validation::parameters;
 use crate::validation::rejection::Rather;
+use crate::validation::weighed_model::WeighedModel;
 
 /// The gain of a force of any form in addition to a model.
 pub(crate) struct FreeFormShare {

@@ -25,3 +25,4 @@ pub(crate) mod second_selection;
 pub(crate) mod shares;
 pub(crate) mod sizes;
 pub(crate) mod tonal;
+pub(crate) mod weighed_model;

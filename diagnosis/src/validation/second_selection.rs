@@ -5,8 +5,8 @@
 use crate::effects::EffectName;
 use crate::effects::definition::NominalTerm;
 use crate::thresholds::{CONTESTS, LIMITED_BY_PHYSICS, MOST_IN_CLASS, SUREST_BESIDE_PHYSICS};
-use crate::validation::confidence_pass::{WeighedEffect, WeighedModel};
 use crate::validation::plain_selection::PlainSelection;
+use crate::validation::weighed_model::{WeighedEffect, WeighedModel};
 
 /// Weighs the named effects again.
 pub(crate) fn compare(weighed: &mut WeighedModel, plain: &PlainSelection) {
