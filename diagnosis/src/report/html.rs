@@ -5,14 +5,11 @@ use crate::io::recording::shown_at;
 use crate::io::rig::Kind;
 use crate::io::schema::{Hypothesis, Named, Verdict};
 use crate::numerics::digits::short;
-use crate::pipeline::diagnosis::Series;
 use crate::report::free_form;
 use crate::report::motion_picture;
 use crate::report::outcome::{Outcome, unit};
+use crate::report::residual_plots::{over_states, over_time};
 use crate::report::simulation_page;
-use crate::validation::residual_maps::Map;
-use html_report::drawing::path;
-use html_report::plot::{HIGH, close, frame};
 use html_report::safe;
 use std::fmt::Write as _;
 
@@ -229,122 +226,6 @@ fn one(out: &mut String, effect: &Named, kind: Kind) {
         let _ = write!(out, "<p class=next><b>Record next:</b> {}.</p>", safe(next));
     }
     out.push_str("</article>");
-}
-
-/// Envelope of a column over few enough places to draw.
-fn envelope(time: &[f64], column: &[Option<f64>], parts: usize) -> Vec<(f64, f64, f64)> {
-    let length = time.len().div_ceil(parts).max(1);
-    time.chunks(length)
-        .zip(column.chunks(length))
-        .filter_map(|(t, c)| {
-            let mut seen = c.iter().flatten();
-            let first = *seen.next()?;
-            let (low, high) = seen.fold((first, first), |(a, b), x| (a.min(*x), b.max(*x)));
-            Some((t[0], low, high))
-        })
-        .collect()
-}
-
-fn over_time(out: &mut String, outcome: &Outcome) {
-    let unit = &outcome.report.fit.unit;
-    let marked = "<span><i class=\"key m\"></i> where</span>";
-    let (after_name, marks_say) = match &outcome.report {
-        report if !report.effects.is_empty() || outcome.evidence.form.is_some() => {
-            ("with what was found", format!(" {marked} the effects found are strongest"))
-        }
-        report if report.place.is_some() => {
-            ("with its values refitted", format!(" {marked} its residual is largest"))
-        }
-        _ => ("with its values refitted", String::new()),
-    };
-    let _ = write!(
-        out,
-        "<section><h2>Where: residual over time</h2><p class=note><span><i class=\"key a\"></i> as it is</span> <span><i class=\"key c\"></i> \
-         {after_name}</span>{marks_say}. Gaps: at rest, where friction is a reaction.</p>",
-    );
-    for series in &outcome.evidence.series {
-        let kind = if series.held_out { "held out" } else { "fitted" };
-        let _ = write!(out, "<h3>{} <small>{kind}</small></h3>", safe(&series.file));
-        let last = series.time_s.last().copied().unwrap_or(1.0);
-        let before = envelope(&series.time_s, &series.nominal, 420);
-        let after = envelope(&series.time_s, &series.patched, 420);
-        let mut sizes: Vec<f64> = before.iter().chain(&after).map(|(_, a, b)| a.abs().max(b.abs())).collect();
-        sizes.sort_by(f64::total_cmp);
-        let top = sizes.get(sizes.len() * 99 / 100).copied().unwrap_or(1.0).max(1e-300);
-        let at = frame(out, (0.0, last), (-top, top), "time, s", &format!("residual force, {unit}"));
-        marks(out, outcome, series, &at);
-        for (class, name, band) in [("a", "as it is", &before), ("c", after_name, &after)] {
-            let _ = write!(out, "<path class=\"band {class}\" data-name=\"{name}\" d=\"");
-            for (t, low, high) in band {
-                let (x, y0) = at(*t, *low);
-                let (_, y1) = at(*t, *high);
-                let _ = write!(out, "M{x:.1} {y0:.1}V{:.1}", y1 - 0.6);
-            }
-            out.push_str("\"/>");
-        }
-        close(out, "time, s");
-    }
-    out.push_str("</section>");
-}
-
-fn marks(out: &mut String, outcome: &Outcome, series: &Series, at: &impl Fn(f64, f64) -> (f64, f64)) {
-    let places = outcome.report.effects.iter().map(|e| &e.place).chain(&outcome.report.place);
-    for place in places {
-        for stretch in place.recordings.iter().filter(|s| s.file == series.file) {
-            for [from, to] in &stretch.intervals_s {
-                let (x0, x1) = (at(*from, 0.0).0, at(*to, 0.0).0);
-                let _ = write!(
-                    out,
-                    "<rect class=mark x={x0:.1} y=0 width={:.1} height={HIGH} />",
-                    (x1 - x0).max(1.0)
-                );
-            }
-        }
-    }
-}
-
-fn over_states(out: &mut String, outcome: &Outcome) {
-    if outcome.evidence.maps.is_empty() {
-        return;
-    }
-    let model = if outcome.report.effects.is_empty() { "refitted" } else { "patched" };
-    let _ = write!(
-        out,
-        "<section><h2>Where: residual over states</h2><p class=note><span><i class=\"key f\"></i> moving forward</span> <span><i class=\"key r\"></i> moving \
-         backward.</span> Mean residual of the {model} model on the fitted recordings.</p><div class=maps>",
-    );
-    for map in &outcome.evidence.maps {
-        draw(out, map, &outcome.report.fit.unit, outcome.evidence.kind.length());
-    }
-    out.push_str("</div></section>");
-}
-
-fn draw(out: &mut String, map: &Map, unit: &str, length: &str) {
-    let x_unit = match map.variable {
-        "speed" => format!("{length}/s"),
-        "time" => "s".to_owned(),
-        "command" => "command units".to_owned(),
-        _ => length.to_owned(),
-    };
-    let top = map.forward.iter().chain(&map.backward).flatten().fold(1e-300_f64, |m, x| m.max(x.abs()));
-    let low = map.edges.first().copied().unwrap_or(0.0);
-    let high = map.edges.last().copied().unwrap_or(1.0);
-    out.push_str("<figure>");
-    let x_label = format!("{}, {x_unit}", map.variable);
-    let at = frame(out, (low, high), (-top, top), &x_label, &format!("residual force, {unit}"));
-    for (class, name, column) in [("f", "forward", &map.forward), ("r", "backward", &map.backward)] {
-        let _ = write!(out, "<path class=\"line {class}\" data-name={name} d=\"");
-        let places = map.edges.windows(2).map(|edges| 0.5 * (edges[0] + edges[1]));
-        path(out, column.iter().zip(places).map(|(value, x)| value.map(|value| at(x, value))));
-        out.push_str("\"/>");
-    }
-    let carries = if map.significant {
-        format!("predicts {:.0} % of the held-out residual", 100.0 * map.carries.max(0.0))
-    } else {
-        "does not generalise to the held-out recordings".to_owned()
-    };
-    close(out, &x_label);
-    let _ = write!(out, "<figcaption>over {}: {carries}</figcaption></figure>", map.variable);
 }
 
 fn hypotheses(out: &mut String, outcome: &Outcome) {

@@ -9,9 +9,11 @@ pub(crate) mod next_experiment;
 mod notes;
 pub(crate) mod outcome;
 mod remains;
+mod residual_plots;
 #[cfg(test)]
 mod sentence_snapshots;
 pub mod simulation_page;
+mod summary;
 pub(crate) mod text;
 mod write;
 

@@ -2,6 +2,7 @@
 //! recordings. Nothing here sees a held-out recording.
 
 pub(crate) mod candidates;
+pub(crate) mod comb;
 pub(crate) mod context;
 pub(crate) mod excitation;
 pub(crate) mod free_form;

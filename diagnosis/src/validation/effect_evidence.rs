@@ -11,8 +11,8 @@ use crate::estimation::model::Model;
 use crate::estimation::nominal::Key;
 use crate::numerics::bootstrap::bootstrap;
 use crate::selection::candidates;
+use crate::selection::comb;
 use crate::selection::context::{FitContext, FittedModel};
-use crate::selection::periodic;
 use crate::selection::predictive::{left_out_costs, left_out_residuals, score_z};
 use crate::thresholds::DRIFT;
 use crate::validation::acceptance_criteria::EffectEvidence;
@@ -122,7 +122,7 @@ impl<'a> JudgedModel<'a> {
             share: self.share(&less),
             off_force: self.off_force(&less),
             at_bound: self.is_at_bound(&effect, i),
-            is_comb: periodic::is_comb(&effect, &last.fit.amplitudes(i)),
+            is_comb: comb::is_comb(&effect, &last.fit.amplitudes(i)),
             sizes,
             material: None,
             effect,

@@ -1,6 +1,6 @@
 //! The encoder's resolution: said, taken from a rig, or seen in the steps of the readings.
 
-use super::roles::Role;
+use super::role::Role;
 use super::rows::Rows;
 use super::units::Quantity;
 use std::f64::consts::TAU;

@@ -14,6 +14,7 @@ mod npy;
 mod npy_array;
 #[cfg(feature = "parquet")]
 mod parquet;
+mod role;
 mod roles;
 #[cfg(feature = "ros")]
 mod ros;

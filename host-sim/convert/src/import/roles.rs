@@ -1,68 +1,11 @@
 //! Which column is what: given by `--column`, else from the names that people give.
 
+use super::role::Role;
 use super::table::{Column, Log};
 use super::units::{self, Quantity, Unit};
 use crate::shell::quoted;
 use device_sim::error::Error;
-use std::fmt;
 use std::path::Path;
-
-/// The role of a column of a recording.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Role {
-    /// Time stamps.
-    Time,
-    /// The command that was sent to the drive.
-    Command,
-    /// The coordinate.
-    Position,
-    /// Its speed.
-    Velocity,
-    /// The reference of a position loop.
-    Reference,
-    /// Inclination below the horizontal.
-    Tilt,
-    /// A measured external load.
-    Force,
-}
-
-impl Role {
-    /// All of them.
-    pub const ALL: [Self; 7] =
-        [Self::Time, Self::Command, Self::Position, Self::Velocity, Self::Reference, Self::Tilt, Self::Force];
-
-    /// As `--column` has it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Time => "time",
-            Self::Command => "command",
-            Self::Position => "position",
-            Self::Velocity => "velocity",
-            Self::Reference => "reference",
-            Self::Tilt => "tilt",
-            Self::Force => "force",
-        }
-    }
-
-    /// The quantities that its unit may measure.
-    fn takes(self, quantity: Quantity) -> bool {
-        use Quantity as Q;
-        match self {
-            Self::Time => quantity == Q::Time,
-            Self::Command => !matches!(quantity, Q::Time | Q::Counts),
-            Self::Position | Self::Reference => matches!(quantity, Q::Angle | Q::Length | Q::Counts),
-            Self::Velocity => matches!(quantity, Q::AngularSpeed | Q::Speed),
-            Self::Tilt => quantity == Q::Angle,
-            Self::Force => matches!(quantity, Q::Torque | Q::Force),
-        }
-    }
-}
-
-impl fmt::Display for Role {
-    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        out.write_str(self.name())
-    }
-}
 
 /// One `--column ROLE=NAME[:UNIT]`; a minus before the name turns the sign.
 #[derive(Clone, Debug)]

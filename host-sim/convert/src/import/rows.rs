@@ -1,6 +1,7 @@
 //! From chosen columns to rows on one clock, in the contract's units.
 
-use super::roles::{self, Choice, Chosen, Role};
+use super::role::Role;
+use super::roles::{self, Choice, Chosen};
 use super::table::{Log, Table};
 use super::units::{Quantity, Unit};
 use device_sim::error::Error;

@@ -1,7 +1,7 @@
 //! Rows made fit for the contract: a clock that rises, no holes, no wraps, no minutes at rest.
 //! Whatever is changed or left out is said.
 
-use super::roles::Role;
+use super::role::Role;
 use super::rows::{Rows, median_step};
 use super::units::Quantity;
 use std::f64::consts::TAU;

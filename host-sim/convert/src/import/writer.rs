@@ -2,7 +2,7 @@
 //! run.
 
 use super::encoder_resolution::Scale;
-use super::roles::Role;
+use super::role::Role;
 use super::rows::Rows;
 use super::units::Quantity;
 use crate::export::write;
