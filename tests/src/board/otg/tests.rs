@@ -1,6 +1,7 @@
 //! The core against a driver and a host written out by hand, register by register.
 
 use super::*;
+use crate::usb_host::wire::Handshake;
 use crate::usb_host::{Host, Port};
 
 const SETUP: [u8; 8] = [0x80, 6, 0, 1, 0, 0, 64, 0];
