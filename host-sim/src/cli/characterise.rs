@@ -72,7 +72,7 @@ impl Characterise {
             let stop = Arc::new(AtomicBool::new(false));
             stop_on_signals(&stop)?;
             let mut port = SerialPort::find(&self.device)?;
-            needle_is_out(self.yes)?;
+            needle_is_out(self.yes, &stop)?;
             characterise::on_port(&mut port, &programmes, &stop, news)?
         };
         drop(bar);

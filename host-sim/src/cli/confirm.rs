@@ -7,8 +7,12 @@ use server::guide::Guide;
 use server::visualizer::{self, Server};
 use std::fmt::Display;
 use std::io::BufRead;
-use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, mpsc};
+use std::time::Duration;
+
+/// The longest time between a stop and the end of a question.
+const PATIENCE: Duration = Duration::from_millis(50);
 
 /// The options for a person's consent.
 #[derive(Args)]
@@ -37,7 +41,7 @@ impl ConsentFlags {
             None
         };
         // Nobody is next to a virtual device.
-        Ok(Consent { yes: self.yes || device == "virtual", guide })
+        Ok(Consent { yes: self.yes || device == "virtual", guide, stop: stop.clone() })
     }
 }
 
@@ -45,6 +49,8 @@ impl ConsentFlags {
 pub(crate) struct Consent {
     yes: bool,
     guide: Option<(Guide, Server)>,
+    /// Set by a person who ends the run.
+    stop: Arc<AtomicBool>,
 }
 
 impl Consent {
@@ -58,7 +64,7 @@ impl Consent {
     pub(crate) fn ask(&self, step: &dyn Display, moves: bool) -> Result<(), Error> {
         match &self.guide {
             Some((guide, _)) => guide.ask(step, moves),
-            None if moves => confirm(step, self.yes),
+            None if moves => confirm(step, self.yes, &self.stop),
             None => {
                 eprintln!("{step}");
                 Ok(())
@@ -85,28 +91,40 @@ impl Consent {
         match &self.guide {
             // Nothing moves before the next step.
             Some((guide, _)) => guide.ask(&NEEDLE_OUT, false),
-            None => confirm(&NEEDLE_OUT, self.yes),
+            None => confirm(&NEEDLE_OUT, self.yes, &self.stop),
         }
     }
 }
 
 const NEEDLE_OUT: &str = "the roller will move on its own: take the needle out of the device, and keep hands off unless a step asks for them";
 
-/// Announces `what` and waits for Enter; with `yes`, only announces it.
-fn confirm(what: &dyn Display, yes: bool) -> Result<(), Error> {
+/// Announces `what` and waits for Enter or `stop`; with `yes`, only announces it.
+fn confirm(what: &dyn Display, yes: bool, stop: &AtomicBool) -> Result<(), Error> {
     eprintln!("{what}");
     if yes {
         return Ok(());
     }
     eprintln!("press Enter to continue, Ctrl-C to stop");
-    let mut line = String::new();
-    match std::io::stdin().lock().read_line(&mut line) {
-        Ok(read) if read > 0 => Ok(()),
-        _ => Err(Error::input("the movement was not confirmed; in a script, add --yes")),
+    // A read of a terminal begins again after a signal, so it waits in a thread of its own.
+    let (answers, answer) = mpsc::channel();
+    std::thread::spawn(move || {
+        let mut line = String::new();
+        let read = std::io::stdin().lock().read_line(&mut line);
+        let _ = answers.send(read.is_ok_and(|read| read > 0));
+    });
+    loop {
+        match answer.recv_timeout(PATIENCE) {
+            Ok(true) => return Ok(()),
+            _ if stop.load(Ordering::Relaxed) => {
+                return Err(Error::failed("stopped before the movement; nothing moved"));
+            }
+            Err(mpsc::RecvTimeoutError::Timeout) => {}
+            _ => return Err(Error::input("the movement was not confirmed; in a script, add --yes")),
+        }
     }
 }
 
 /// The same as [`Consent::needle_is_out`] without a page.
-pub(crate) fn needle_is_out(yes: bool) -> Result<(), Error> {
-    confirm(&NEEDLE_OUT, yes)
+pub(crate) fn needle_is_out(yes: bool, stop: &AtomicBool) -> Result<(), Error> {
+    confirm(&NEEDLE_OUT, yes, stop)
 }

@@ -140,6 +140,23 @@ fn a_report_of_nothing_that_helps_leaves_the_device_as_it_was() {
 }
 
 #[test]
+fn what_the_device_fed_forward_before_stays_where_it_is_felt_less() {
+    let (mut line, _, _) = compensated(&rig("hidden-found.toml"));
+    let had = *line.device().plan().device();
+    let mut less = rig("hidden-found.toml");
+    // A report that found the friction only; alone it helps, and the device had more.
+    less.effects.clear();
+    let outcome =
+        compensate::compensate(&mut line, &less, Wish::default(), |_| Ok(())).expect("it ends well");
+    let was = outcome.as_it_was.expect("the device fed something forward").all();
+    assert!(was <= outcome.before.all() / 4.0, "{was} N of {}", outcome.before.all());
+    assert!(!outcome.is_compensated, "{:?} after {was} N", outcome.after.all());
+    assert!(outcome.taken_back.last().is_some_and(|why| why.contains("fed forward before")));
+    assert_eq!(*line.device().plan().device(), had);
+    assert!((outcome.after.all() - was).abs() < 1e-12, "it feels as it was");
+}
+
+#[test]
 fn the_numbers_are_those_of_the_mechanism_on_the_devices_scale() {
     let found =
         coefficients::found(&rig("hidden-found.toml"), &Device::commissioned_virtual(), 1.0).expect("sound");

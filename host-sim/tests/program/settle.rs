@@ -257,7 +257,7 @@ fn a_stop_while_feeding_forward_gives_back_what_the_device_had() {
     assert_eq!(*device.lock().expect("nobody panicked").plan().device(), before);
 }
 
-/// Takes 10 s: a round has to be recorded and diagnosed before a person can end the next one.
+/// Takes 10 s: a round has to be recorded and diagnosed before a person can end the run.
 #[test]
 fn a_run_that_is_ended_keeps_its_rounds() {
     let out = folder("settle-kept");
@@ -265,7 +265,7 @@ fn a_run_that_is_ended_keeps_its_rounds() {
     let settings = Settings { rounds: 5, compensate: false, ..settings(&out, 38.0, true) };
     let mut parts = Vec::new();
     let ended = settle(&mut subject, &rig, &settings, |progress| match progress {
-        Progress::Asked(2, ..) => Err(Error::failed("not again")),
+        Progress::Said(_) => Err(Error::failed("not again")),
         Progress::Diagnoses(part) => {
             parts.push(part);
             Ok(())
@@ -279,6 +279,10 @@ fn a_run_that_is_ended_keeps_its_rounds() {
     let conclusion = json["conclusion"].as_str().expect("a sentence");
     assert!(conclusion.contains("it ended early: not again"), "{conclusion}");
     assert!(out.join("settle.html").is_file());
+    let names = json["names"].as_array().expect("names");
+    assert!(!names.is_empty(), "{json}");
+    let patched = Rig::read(&out.join("patched-rig.toml")).expect("what is settled is kept");
+    assert_eq!(patched.effects.len(), names.len());
     assert!(parts.len() > 5 && parts.is_sorted(), "progress never falls: {parts:?}");
 }
 

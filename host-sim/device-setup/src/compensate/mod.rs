@@ -51,7 +51,10 @@ pub struct Outcome {
     pub angle: Option<angle::Angle>,
     /// The force of the mechanism that a hand would feel without compensation.
     pub before: Felt,
-    /// The force that it would feel with compensation.
+    /// The force that it felt before, with what the device fed forward; none where it fed nothing
+    /// forward.
+    pub as_it_was: Option<Felt>,
+    /// The force that it feels with what the device feeds forward now.
     pub after: Felt,
     /// The weight that was measured because the report had none, in mN·m.
     pub weight_mnm: Option<f64>,
@@ -169,7 +172,8 @@ impl<A: AsyncFnMut(Step) -> Result<(), Error>> Work<'_, '_, A> {
     async fn run(&mut self) -> Result<Outcome, Error> {
         let radius = self.before.roller_radius.0.to_num::<f64>();
         let (turns, hold) = excitations(self.found.inertia, radius, false);
-        self.may_move(&turns, &hold)?;
+        let was_fed = Part::ALL.into_iter().any(|part| part.is_fed(&self.before.compensation));
+        self.may_move(&turns, &hold, if was_fed { 3.0 } else { 2.0 })?;
         let level = if self.found.has_weight { None } else { Some(self.turn_level(&turns).await?) };
         (self.ask)(Step::Tilt).await?;
         self.bench.settle().await?;
@@ -184,7 +188,9 @@ impl<A: AsyncFnMut(Step) -> Result<(), Error>> Work<'_, '_, A> {
         } else {
             None
         };
-        let (kept, taken_back) = self.keep_what_helps(&full, &before, angle).await?;
+        let as_it_was = if was_fed { Some(self.felt_with(&Device { ..self.before }).await?) } else { None };
+        let (kept, mut taken_back) = self.keep_what_helps(&full, &before, angle).await?;
+        let kept = unless_felt_more(kept, as_it_was.as_ref(), &mut taken_back);
         let is_compensated = kept.is_some();
         if !is_compensated {
             self.bench.configure(&self.before).await?;
@@ -193,7 +199,8 @@ impl<A: AsyncFnMut(Step) -> Result<(), Error>> Work<'_, '_, A> {
             record: self.bench.record().await?,
             angle,
             before,
-            after: kept.map_or(before, |kept| kept.felt),
+            as_it_was,
+            after: kept.map_or(as_it_was.unwrap_or(before), |kept| kept.felt),
             weight_mnm,
             left_out: std::mem::take(&mut self.found.left_out),
             taken_back,
@@ -202,10 +209,11 @@ impl<A: AsyncFnMut(Step) -> Result<(), Error>> Work<'_, '_, A> {
         })
     }
 
-    /// Refuses what would take more motion than is allowed.
-    fn may_move(&self, turns: &Excitation, hold: &Excitation) -> Result<(), Error> {
+    /// Refuses what would take more motion than is allowed, if the turns and the hold are played
+    /// `times` times.
+    fn may_move(&self, turns: &Excitation, hold: &Excitation, times: f64) -> Result<(), Error> {
         let level = if self.found.has_weight { 0.0 } else { seconds(turns) };
-        let needed = level + 2.0 * (seconds(turns) + seconds(hold));
+        let needed = level + times * (seconds(turns) + seconds(hold));
         if needed <= self.wish.motion_s {
             return Ok(());
         }
@@ -296,14 +304,19 @@ impl<A: AsyncFnMut(Step) -> Result<(), Error>> Work<'_, '_, A> {
         angle: Option<angle::Angle>,
         step: Step,
     ) -> Result<Trial, Error> {
-        let radius = device.roller_radius.0.to_num::<f64>();
         (self.ask)(step).await?;
         self.bench.settle().await?;
         self.configure(device, angle).await?;
+        let felt = self.felt_with(device).await?;
+        Ok(Trial { device: *device, felt })
+    }
+
+    /// Plays the turns and the hold with what `device`, as which it is configured, feeds forward.
+    async fn felt_with(&mut self, device: &Device) -> Result<Felt, Error> {
+        let radius = device.roller_radius.0.to_num::<f64>();
         let (turns, hold) = excitations(self.found.inertia, radius, true);
         let fed = play(self.bench, &turns, &hold).await?;
-        let felt = felt::felt(&plan(device)?, (&turns, &fed.0), (&hold, &fed.1))?;
-        Ok(Trial { device: *device, felt })
+        felt::felt(&plan(device)?, (&turns, &fed.0), (&hold, &fed.1))
     }
 
     async fn configure(&mut self, device: &Device, angle: Option<angle::Angle>) -> Result<(), Error> {
@@ -314,6 +327,26 @@ impl<A: AsyncFnMut(Step) -> Result<(), Error>> Work<'_, '_, A> {
             None => Ok(()),
         }
     }
+}
+
+/// A trial, unless the hand felt less with what the device fed forward before.
+fn unless_felt_more(
+    trial: Option<Trial>,
+    as_it_was: Option<&Felt>,
+    taken_back: &mut Vec<String>,
+) -> Option<Trial> {
+    let (Some(felt), Some(was)) = (trial.as_ref().map(|trial| trial.felt.all()), as_it_was) else {
+        return trial;
+    };
+    if felt < was.all() {
+        return trial;
+    }
+    taken_back.push(format!(
+        "all of it was taken back: with it the hand felt {:.1} mN rms, and {:.1} with what the device fed forward before",
+        felt * 1e3,
+        was.all() * 1e3
+    ));
+    None
 }
 
 /// By how much the phases that are felt more than before are so, beyond what two runs differ, in N.

@@ -106,7 +106,7 @@ pub fn on_port(
             if stop.load(Ordering::Relaxed) {
                 let out = sequencer.stop(begin.elapsed()).to_vec();
                 let _ = wire.write(&out);
-                return Err(Error::failed("stopped before the end; nothing was written"));
+                return Err(Error::failed("stopped before the end; what was being recorded is not kept"));
             }
             let now = begin.elapsed();
             let out = sequencer.transmit(now, |step| device_tilt(step, &mut news)).to_vec();

@@ -28,6 +28,12 @@ pub fn html(outcome: &Outcome) -> String {
             decimal(weight, 3)
         ));
     }
+    if let Some(was) = &outcome.as_it_was {
+        sheet.note(&format!(
+            "The device fed something forward before, with which the hand felt {} mN; \"before\" is the mechanism without it.",
+            decimal(was.all() * 1e3, 1)
+        ));
+    }
     for sentence in outcome.taken_back.iter().chain(&outcome.left_out) {
         sheet.note(sentence);
     }

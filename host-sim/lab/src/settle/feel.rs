@@ -11,7 +11,7 @@ use diagnosis::rig::Rig;
 /// The force that the mechanism adds to a hand, before and after.
 #[derive(Clone, Debug)]
 pub struct Feel {
-    /// As the device was.
+    /// With nothing fed forward.
     pub before: Felt,
     /// With what it feeds forward.
     pub after: Felt,
@@ -26,7 +26,8 @@ pub struct Feel {
 /// forward.
 ///
 /// # Errors
-/// A sentence if a person ends it or a file cannot be written.
+/// A sentence if it ends after the roller has moved, for whatever reason, or a file cannot be
+/// written.
 pub(super) fn feel(
     subject: &mut Subject,
     rig: &Rig,
@@ -34,25 +35,28 @@ pub(super) fn feel(
     (radius_mm, wish): (f64, Wish),
     progress: &mut impl FnMut(Progress) -> Result<(), Error>,
 ) -> Result<Result<Feel, String>, Error> {
-    let mut ended = None;
+    let mut has_begun = false;
     let outcome = subject.talk(radius_mm, |line| {
         compensate::compensate(line, rig, wish, |step| {
-            progress(Progress::Feeds(step)).map_err(|error| {
-                let sentence = error.to_string();
-                ended = Some(error);
-                Error::failed(sentence)
-            })
+            has_begun = true;
+            progress(Progress::Feeds(step))
         })
     });
-    if let Some(error) = ended {
-        return Err(error);
-    }
     let outcome = match outcome {
         Ok(outcome) => outcome,
-        Err(why) => return Ok(Err(format!("nothing is fed forward: {why}"))),
+        // Nobody has touched the device: this is only what it cannot feed forward.
+        Err(why) if !has_begun => return Ok(Err(format!("nothing is fed forward: {why}"))),
+        Err(why) => return Err(why),
     };
     files::write(&settings.out, &settings.device, &outcome)?;
-    let notes: Vec<String> = outcome.taken_back.iter().chain(&outcome.left_out).cloned().collect();
+    let was = outcome.as_it_was.as_ref().map(|was| {
+        format!(
+            "the device fed something forward before, with which the hand felt {:.1} mN rms",
+            was.all() * 1e3
+        )
+    });
+    let notes: Vec<String> =
+        outcome.taken_back.iter().chain(&outcome.left_out).chain(&was).cloned().collect();
     if !outcome.is_compensated {
         return Ok(Err(format!("nothing is fed forward: {}", notes.join("; "))));
     }

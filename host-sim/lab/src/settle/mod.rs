@@ -138,7 +138,7 @@ pub fn settle(
     mut progress: impl FnMut(Progress) -> Result<(), Error> + Send,
 ) -> Result<Settled, Error> {
     let limited = Limited::new(rig, subject.config()?)?;
-    let mut run = Run { limited, rig, settings, request: Request::default() };
+    let mut run = Run { limited, rig, settings, request: Request::default(), last: None };
     let mut settled = Settled::default();
     let outcome = run.all(subject, &mut settled, &mut progress);
     if let (Err(error), false) = (&outcome, settled.rounds.is_empty()) {
@@ -160,6 +160,8 @@ struct Run<'a> {
     settings: &'a Settings,
     /// All recordings so far.
     request: Request,
+    /// The diagnosis of them.
+    last: Option<Outcome>,
 }
 
 impl Run<'_> {
@@ -170,10 +172,13 @@ impl Run<'_> {
         settled: &mut Settled,
         progress: &mut (impl FnMut(Progress) -> Result<(), Error> + Send),
     ) -> Result<(), Error> {
-        let last = self.rounds(subject, settled, progress)?;
-        let Some(last) = last.filter(|_| !settled.names.is_empty()) else { return Ok(()) };
+        let outcome = self.rounds(subject, settled, progress);
+        let Some(last) = self.last.take().filter(|_| !settled.names.is_empty()) else { return outcome };
+        // What is settled is kept, however the run ended.
         let found = patched::patched(&last, &settled.names);
-        written_rig(&self.settings.out.join("patched-rig.toml"), &found)?;
+        let written = written_rig(&self.settings.out.join("patched-rig.toml"), &found);
+        outcome?;
+        written?;
         if self.settings.compensate {
             let wish = Wish { motion_s: MOST_MOTION_S - settled.motion_s(), ..Wish::default() };
             let radius_mm = self.limited.radius_mm();
@@ -182,15 +187,14 @@ impl Run<'_> {
         Ok(())
     }
 
-    /// Plays round after round until nothing is left to ask; returns the last diagnosis.
+    /// Plays round after round until nothing is left to ask.
     fn rounds(
         &mut self,
         subject: &mut Subject,
         settled: &mut Settled,
         progress: &mut (impl FnMut(Progress) -> Result<(), Error> + Send),
-    ) -> Result<Option<Outcome>, Error> {
+    ) -> Result<(), Error> {
         let mut asked = first(&self.limited, self.rig, self.settings)?;
-        let mut last = None;
         loop {
             let number = settled.rounds.len() + 1;
             let folder = self.settings.out.join(format!("round-{number}"));
@@ -207,24 +211,23 @@ impl Run<'_> {
                     // The names of the round before stand.
                     settled.conclusion = format!("the recordings of round {number} cannot be used: {error}");
                     settled.discarded_s = asked.programmes.iter().map(Programme::seconds).sum();
-                    return Ok(last);
+                    return Ok(());
                 }
             };
-            let report = &outcome.report;
-            progress(Progress::Said(&report.sentence))?;
+            let report = &self.last.insert(outcome).report;
             let before = settled.rounds.last().map_or(&[][..], |round| &round.names);
             let round = round(asked, report, before);
             settled.rounds.push(round);
             settled.count_looks(self.settings.most_rounds());
+            progress(Progress::Said(&report.sentence))?;
             let folder = folder.join("report");
             match following(&self.limited, report, &folder, self.settings, settled)? {
                 Ok(next) => asked = next,
                 Err(conclusion) => {
                     settled.conclusion = conclusion;
-                    return Ok(Some(outcome));
+                    return Ok(());
                 }
             }
-            last = Some(outcome);
         }
     }
 

@@ -3,14 +3,15 @@
 use super::{Asked, in_words};
 use crate::characterise;
 use crate::characterise::programme::{Programme, Step, TRAVEL_MM};
-use control_core::Config;
 use control_core::excitation::{self, Excitation, Servo};
 use control_core::units::{Millimetres, MillimetresPerSecond, MillinewtonMetres};
+use control_core::{Config, Device, TICK_HZ};
 use device_setup::servo::{on_roller, servo};
 use device_sim::error::Error;
 use diagnosis::rig::Rig;
 use experiment::{Design, Input, Limits, Segment, Signal, random_multisine};
 use fixed::types::I16F16;
+use std::f64::consts::TAU;
 
 /// Largest speed of an input along the roller, mm/s: near the fastest steps of `characterise`, 640
 /// and 680 mm/s.
@@ -20,6 +21,14 @@ const SPEED_MM_PER_S: f64 = 650.0;
 /// epidural is pushed in by 40 to 60 mm in some seconds.
 const PRACTICE: [(f64, f64, f64); 2] = [(50.0, 50.0, 0.6), (20.0, 20.0, 0.4)];
 
+/// Part of the device's torque and speed that inputs without a design use: four fifths, less what
+/// fixed point rounds up.
+const USED: f64 = 0.79;
+/// Steps of a staircase.
+const STEPS: u8 = 6;
+/// The shortest way between two reversals that a device plays, mm.
+const SHORTEST_MM: f64 = 0.0101;
+
 /// Strokes before random multisines, s.
 const STROKES_S: f64 = 3.0;
 
@@ -28,6 +37,8 @@ pub(super) struct Limited {
     config: Config,
     radius_mm: f64,
     torque: f64,
+    /// The fastest input along the roller, mm/s.
+    speed_mm_per_s: f64,
     servo: Servo,
     dry: f64,
 }
@@ -39,6 +50,7 @@ impl Limited {
         Ok(Self {
             radius_mm,
             torque: config.device.limits.torque.0.to_num::<f64>() * 1e-3,
+            speed_mm_per_s: SPEED_MM_PER_S.min(fastest_mm_per_s(&config.device, radius_mm)),
             servo: servo(rig.model.inertia, radius_mm),
             dry: rig.model.coulomb.unwrap_or(4.0e-4),
             config,
@@ -51,7 +63,7 @@ impl Limited {
 
     /// Travel in rad, speed in rad/s and torque in N·m.
     pub(super) fn limits(&self) -> (f64, f64, f64) {
-        (TRAVEL_MM / self.radius_mm, SPEED_MM_PER_S / self.radius_mm, self.torque)
+        (TRAVEL_MM / self.radius_mm, self.speed_mm_per_s / self.radius_mm, self.torque)
     }
 
     /// A round of some of everything.
@@ -59,11 +71,24 @@ impl Limited {
         let rad = |mm: f64| mm / self.radius_mm;
         let frequencies = vec![3, 5, 9, 14, 21, 32, 47, 68, 97, 139, 197, 281];
         let signals = [
-            (Signal::Staircase { slowest: rad(5.0), ratio: 2.2, steps: 6, dwell_s: 0.4 }, 0.4),
+            (self.staircase(rad(5.0), 2.2, 0.4), 0.4),
             (Signal::Ladder { smallest: rad(0.06), ratio: 2.0, steps: 8, speed: rad(12.0) }, 0.35),
-            (Signal::Multisine { force: self.dry, frequencies }, 0.25),
+            (Signal::Multisine { force: self.sines(self.dry, frequencies.len()), frequencies }, 0.25),
         ];
         self.of_input(&together(signals, most_s), why.to_owned(), None)
+    }
+
+    /// The force of each of `lines` sines, N·m: no more than leaves a fifth of the torque when all
+    /// of them are at their peaks.
+    fn sines(&self, force: f64, lines: usize) -> f64 {
+        force.min(USED * self.torque / lines as f64)
+    }
+
+    /// A staircase whose fastest step leaves a fifth of the speed; speeds in rad/s.
+    fn staircase(&self, slowest: f64, ratio: f64, dwell_s: f64) -> Signal {
+        let (_, speed, _) = self.limits();
+        let slowest = slowest.min(USED * speed / ratio.powi(i32::from(STEPS) - 1));
+        Signal::Staircase { slowest, ratio, steps: STEPS, dwell_s }
     }
 
     /// A later round of some of everything, with other numbers: other speeds, faster reversals, and
@@ -73,8 +98,14 @@ impl Limited {
         let line = |hz: u16| (pace * f64::from(hz)).round() as u16;
         let frequencies = [6, 10, 16, 24, 36, 52, 75, 108, 151, 212, 289, 390].map(line).to_vec();
         let signals = [
-            (Signal::Multisine { force: 2.0 * pace * self.dry, frequencies }, 0.25),
-            (Signal::Staircase { slowest: rad(8.0), ratio: 2.0, steps: 6, dwell_s: 0.5 }, 0.4),
+            (
+                Signal::Multisine {
+                    force: self.sines(2.0 * pace * self.dry, frequencies.len()),
+                    frequencies,
+                },
+                0.25,
+            ),
+            (self.staircase(rad(8.0), 2.0, 0.5), 0.4),
             (Signal::Ladder { smallest: rad(0.1), ratio: 2.0, steps: 8, speed: rad(30.0) }, 0.35),
         ];
         self.of_input(&together(signals, most_s), why.to_owned(), None)
@@ -157,7 +188,10 @@ impl Limited {
                 speed: MillimetresPerSecond(mm(*speed)),
             },
             Signal::Ladder { smallest, ratio, steps, speed } => excitation::Signal::ReversalLadder {
-                smallest: Millimetres(mm(*smallest)),
+                // A fine encoder shows shorter ways than a device plays.
+                smallest: Millimetres(I16F16::saturating_from_num(
+                    (*smallest * self.radius_mm).max(SHORTEST_MM),
+                )),
                 ratio: I16F16::saturating_from_num(*ratio),
                 steps: *steps,
                 speed: MillimetresPerSecond(mm(*speed)),
@@ -180,6 +214,12 @@ impl Limited {
         };
         Step { excitation, prompt: None }
     }
+}
+
+/// The fastest that a device may turn, mm/s along its roller: faster, its encoder seems to jump.
+fn fastest_mm_per_s(device: &Device, radius_mm: f64) -> f64 {
+    let counts_per_s = f64::from(device.limits.max_counts_per_tick) * f64::from(TICK_HZ);
+    TAU * radius_mm * counts_per_s / f64::from(device.counts_per_turn)
 }
 
 /// Signals one after the other, each for its part of the time.
@@ -228,14 +268,45 @@ mod tests {
         let limited = limited();
         let rounds =
             [limited.general("", 12.0), limited.general_again("", 1.0, 16.0), limited.practice(12.0)];
-        for asked in rounds.into_iter().map(|asked| asked.expect("it is within the limits")) {
-            for step in asked.programmes.iter().flat_map(|programme| &programme.steps) {
-                let (mm, mm_per_s, torque) = most(&step.excitation.signal);
-                assert!(mm <= 0.8 * TRAVEL_MM, "{mm} mm: {:?}", step.excitation.signal);
-                assert!(mm_per_s <= 0.8 * SPEED_MM_PER_S, "{mm_per_s} mm/s: {:?}", step.excitation.signal);
-                assert!(torque <= 0.8e3 * limited.torque, "{torque} mN·m: {:?}", step.excitation.signal);
-            }
+        rounds
+            .into_iter()
+            .for_each(|asked| leaves_a_fifth(&asked.expect("it is within the limits"), &limited));
+    }
+
+    fn leaves_a_fifth(asked: &Asked, limited: &Limited) {
+        for step in asked.programmes.iter().flat_map(|programme| &programme.steps) {
+            let (mm, mm_per_s, torque) = most(&step.excitation.signal);
+            assert!(mm <= 0.8 * TRAVEL_MM, "{mm} mm: {:?}", step.excitation.signal);
+            assert!(
+                mm_per_s <= 0.8 * limited.speed_mm_per_s,
+                "{mm_per_s} mm/s: {:?}",
+                step.excitation.signal
+            );
+            assert!(torque <= 0.8e3 * limited.torque, "{torque} mN·m: {:?}", step.excitation.signal);
         }
+    }
+
+    #[test]
+    fn a_stiff_or_a_slow_device_is_asked_for_no_more_than_it_has() {
+        let mut config = configuration();
+        // 314 mm/s where it is 2,513 by default.
+        config.device.limits.max_counts_per_tick = 2;
+        let mut rig = nominal_rig(&characterise::scale(&config).expect("the configuration is sound"));
+        rig.model.coulomb = Some(4.0e-3);
+        let limited = Limited::new(&rig, config).expect("the configuration is sound");
+        assert!((limited.speed_mm_per_s - 314.2).abs() < 0.1, "{} mm/s", limited.speed_mm_per_s);
+        let rounds = [limited.general("", 12.0), limited.general_again("", 1.0, 16.0)];
+        rounds
+            .into_iter()
+            .for_each(|asked| leaves_a_fifth(&asked.expect("it is within the limits"), &limited));
+    }
+
+    #[test]
+    fn a_ladder_of_a_fine_encoder_begins_with_what_the_device_plays() {
+        let limited = limited();
+        let signal = Signal::Ladder { smallest: 1e-4, ratio: 2.0, steps: 8, speed: 1.0 };
+        let input = Input { segments: vec![Segment { signal, seconds: 4.0 }] };
+        limited.of_input(&input, String::new(), None).expect("the device plays it");
     }
 
     /// The farthest reference in mm, its largest speed in mm/s, and the largest torque in mN·m, if
