@@ -130,4 +130,23 @@ mod tests {
             "link/src/a.rs: replace A::b -> u8 with 0"
         );
     }
+
+    /// A reason that names a function that has moved explains nothing.
+    #[test]
+    fn every_survivor_is_in_a_function_of_its_file() {
+        let reasons = lines(&shell::top().join("tests/mutants.md")).expect("it is there");
+        let listed: Vec<&str> = reasons.iter().filter_map(|line| line.strip_prefix("- `")).collect();
+        assert!(listed.len() > 15, "{} survivors", listed.len());
+        for survivor in listed {
+            let (file, change) = survivor.split_once(": ").expect("a file and its change");
+            let source =
+                fs::read_to_string(shell::top().join(file)).unwrap_or_else(|why| panic!("{file}: {why}"));
+            // A change outside functions has no place.
+            let change = change.split('`').next().unwrap_or(change);
+            let Some((_, path)) = change.split_once(" in ") else { continue };
+            let function = path.rsplit("::").next().unwrap_or(path);
+            let is_defined = |bracket: char| source.contains(&format!("fn {function}{bracket}"));
+            assert!(is_defined('(') || is_defined('<'), "{file}: no {function}");
+        }
+    }
 }

@@ -140,7 +140,7 @@ fn a_report_of_nothing_that_helps_leaves_the_device_as_it_was() {
 }
 
 #[test]
-fn what_the_device_fed_forward_before_stays_where_it_is_felt_less() {
+fn what_was_fed_forward_before_stays_where_it_is_felt_less() {
     let (mut line, _, _) = compensated(&rig("hidden-found.toml"));
     let had = *line.device().plan().device();
     let mut less = rig("hidden-found.toml");
