@@ -110,6 +110,9 @@ pub(crate) const FORM_SURE_Z: f64 = 3.0;
 /// friction by direction takes a quarter of what any force over speed takes, as real friction has
 /// more to it than one law.
 pub(crate) const NEARLY_ALL_OF_FORM: f64 = 0.9;
+/// Part of the held-out gain of an effect that may be a constant force which a force of any form
+/// must gain to deny it: the noise that both are compared under wanders as a constant does.
+pub(crate) const FORM_OF_CONSTANT: f64 = 0.1;
 /// Part of the innovations' mean square that a force of any form must explain to be reported.
 pub(crate) const FORM_TOLD: f64 = 0.005;
 /// Part of an effect's gain that physics outside the library must gain instead: a law of slightly

@@ -67,6 +67,9 @@ impl EffectLaw for Defined {
     fn depends_on(&self) -> Option<Variable> {
         Some(Variable::Speed)
     }
+    fn may_be_constant(&self) -> bool {
+        true
+    }
 }
 
 impl EffectSearch for Defined {

@@ -243,7 +243,9 @@ impl Scales<'_> {
         }
         let class = alternatives::class(found, self.excitation, left.leaves_much, context);
         weighed.undecided = alternatives::nearest(found, &class) < BEHIND_Z;
-        let most = match (weighed.undecided, left.is_other_physics) {
+        // Shares take each recording's bias off, so they do not see what may be constant.
+        let is_seen = !found.effect.name.definition().may_be_constant();
+        let most = match (weighed.undecided, left.is_other_physics && is_seen) {
             (true, _) => UNDECIDED,
             (false, true) => SUREST_BESIDE_PHYSICS,
             (false, false) => 1.0,

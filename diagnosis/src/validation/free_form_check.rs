@@ -6,6 +6,7 @@ use crate::estimation::model::Model;
 use crate::estimation::noise::Colour;
 use crate::selection::context::{FitContext, FittedModel};
 use crate::selection::free_form::{Evaluator, Shape, Taken, is_told};
+use crate::thresholds::FORM_OF_CONSTANT;
 use crate::validation::effect_evidence::gather_evidence;
 use crate::validation::holdout_set::HoldoutSet;
 use crate::validation::parameters;
@@ -44,9 +45,11 @@ pub(crate) fn check(
         }
         let mut less = model.clone();
         less.effects.remove(i);
-        let variable = model.effects[i].name.definition().depends_on();
-        let standing = whole.standing(&evaluator.densities(&less), variable);
-        if let Some(against) = standing.against {
+        let definition = model.effects[i].name.definition();
+        let standing = whole.standing(&evaluator.densities(&less), definition.depends_on());
+        let enough = if definition.may_be_constant() { FORM_OF_CONSTANT } else { 0.0 };
+        let least = enough * weighed.effects[i].found.holdout.sum;
+        if let Some(against) = standing.against.filter(|against| against.most > least) {
             let (over, form) = (against.inputs, against.most);
             weighed.effects[i].rather = Some(Rather::FreeForm { over, form, effect: standing.own.sum });
         }

@@ -114,6 +114,14 @@ fn without_tests(text: &str) -> (Vec<&str>, Vec<String>) {
     (lines, files)
 }
 
+/// The file of a module that `file` declares.
+fn below(file: &Path, module: &str) -> PathBuf {
+    match file.file_stem().and_then(|stem| stem.to_str()) {
+        Some("mod" | "lib") | None => file.with_file_name(module),
+        Some(_) => file.with_extension("").join(module),
+    }
+}
+
 /// True if a line of code names an effect, by `EffectName` or by its name in a file.
 fn names_effect(line: &str, aliases: &[String], variants: &[String]) -> bool {
     let code = line.split("//").next().unwrap_or("");
@@ -139,7 +147,7 @@ fn what_an_effect_is_stands_in_its_file() {
         .collect();
     let tests: Vec<PathBuf> = texts
         .iter()
-        .flat_map(|(file, text)| without_tests(text).1.into_iter().map(|test| file.with_file_name(test)))
+        .flat_map(|(file, text)| without_tests(text).1.into_iter().map(|test| below(file, &test)))
         .collect();
     let mut naming: Vec<(String, String)> = Vec::new();
     let mut in_effects = 0;
@@ -175,7 +183,7 @@ fn what_an_effect_is_stands_in_its_file() {
 const OTHER_WORDS: [(&str, &[&str], &str); 8] = [
     ("src/io/known_keys.rs", &["viscous", "weight", "limit", "turn"], "keys of a rig beside its effects"),
     ("src/report/exports.rs", &["damping", "limit"], "keys of an exported joint"),
-    ("src/report/html.rs", &["speed"], "a variable of the motion"),
+    ("src/report/residual_plots.rs", &["speed"], "a variable of the motion"),
     ("src/report/outcome.rs", &["speed", "viscous", "weight"], "a variable, and keys of a rig's model"),
     ("src/validation/residual_maps.rs", &["speed"], "a variable of the motion"),
     ("experiment/src/case.rs", &["speed"], "a limit of the input"),
@@ -225,7 +233,7 @@ fn a_key_of_a_shape_is_spelled_in_effects_alone() {
     let text = |file: &PathBuf| fs::read_to_string(file).expect("a source can be read");
     let tests: Vec<PathBuf> = files
         .iter()
-        .flat_map(|file| without_tests(&text(file)).1.into_iter().map(|test| file.with_file_name(test)))
+        .flat_map(|file| without_tests(&text(file)).1.into_iter().map(|test| below(file, &test)))
         .collect();
     let texts: Vec<(String, String)> = files
         .iter()

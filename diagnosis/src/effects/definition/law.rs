@@ -141,4 +141,10 @@ pub(crate) trait EffectLaw: Sync {
     fn depends_on(&self) -> Option<Variable> {
         None
     }
+
+    /// True if it may act as a constant force as long as the axis moves: then each recording's own
+    /// bias, and a disturbance that wanders, takes nearly all of it.
+    fn may_be_constant(&self) -> bool {
+        false
+    }
 }
