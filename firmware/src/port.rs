@@ -80,7 +80,7 @@ pub trait SupplyLevel {
 
 /// The watchdog, which runs.
 pub trait Watchdog {
-    /// Puts the end off.
+    /// Starts its countdown again.
     fn feed(&mut self);
     /// True if it stands still while a debugger halts the core.
     fn stop_on_debug(&mut self, stop: bool);

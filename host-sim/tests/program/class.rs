@@ -231,13 +231,13 @@ fn measured(members: usize) -> (f64, f64, f64) {
     (cpu, seconds, rate)
 }
 
-/// The cores that thirty devices with their instructor may take. One is wanted, and 1.3 is what they
-/// took when this was written.
+/// The cores that thirty devices with their instructor may take. One is wanted, and 1.3 is what
+/// they took when this was written.
 #[cfg(target_os = "linux")]
 const MOST_CORES: f64 = 1.6;
 
-/// One, ten and thirty devices with their instructor. Prints the row of `cargo xtask nightly class`,
-/// and for `cargo xtask bench` the CPU time of each class.
+/// One, ten and thirty devices with their instructor. Prints the row of
+/// `cargo xtask nightly class`, and for `cargo xtask bench` the CPU time of each class.
 #[cfg(target_os = "linux")]
 #[test]
 #[ignore = "measures: needs a machine that does nothing else, `cargo xtask nightly class` runs it"]

@@ -5,7 +5,7 @@ use super::rows::Rows;
 use super::units::Quantity;
 use std::f64::consts::TAU;
 
-/// Counts per rad or m where the readings have no steps: a nanometre would be too fine for nobody.
+/// Counts per rad or m where the readings have no steps: finer than any log resolves.
 const FINE: f64 = 1e6;
 /// Readings are multiples of a step where this part of their changes is, within a twentieth of it.
 const SHARE: f64 = 0.995;

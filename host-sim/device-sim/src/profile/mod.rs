@@ -246,6 +246,7 @@ fn force_n(parabola: &config::Parabola, travel_mm: f64) -> f64 {
 struct File {
     format: u32,
     name: String,
+    /// Angle of the needle to the skin at entry, 5 to 90 degrees.
     entry_deg: f64,
     /// In N; without it, as much as the device gives.
     largest_force_n: Option<f64>,
@@ -268,7 +269,9 @@ struct File {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Vessel {
+    /// Across the vessel, mm; its height is from its near to its far wall.
     width_mm: f64,
+    /// Distance of its axis from the needle's plane, mm.
     #[serde(default)]
     offset_mm: f64,
 }
@@ -293,9 +296,13 @@ struct Layer {
 #[derive(Clone, Copy, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Wall {
+    /// Force while it is pushed in.
     elastic: Parabola,
+    /// Travel past contact along the needle at which it gives way, mm.
     puncture_mm: f64,
+    /// Force from there on.
     relief: Parabola,
+    /// Slope by which its force falls when the needle is drawn back, N/mm.
     unload_n_per_mm: f64,
     /// An assumption where it is left out: nobody gives it.
     spring_back: Option<f64>,
@@ -304,8 +311,11 @@ struct Wall {
 #[derive(Clone, Copy, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Parabola {
+    /// Travel n at which the force is least, mm; `(T − n)²/a + b` is the force after a travel T.
     vertex_mm: f64,
+    /// a, mm²/N.
     compliance_mm2_per_n: f64,
+    /// The least force b, N.
     base_n: f64,
 }
 
