@@ -295,7 +295,8 @@ fn has_nextest() -> bool {
 fn tests() -> Command {
     let mut command = cargo();
     if has_nextest() {
-        command.args(["nextest", "run", "--no-fail-fast", "--status-level", "fail"]);
+        command.args(["nextest", "run", "--config-file", "tests/nextest.toml"]);
+        command.args(["--no-fail-fast", "--status-level", "fail"]);
     } else {
         command.args(["test", "--no-fail-fast", "--quiet"]);
     }

@@ -134,7 +134,7 @@ fn the_control_path_does_not_notice_hostile_clients() {
         run.worst()
     );
     assert!(rounds.iter().all(|&connected| connected == CONNECTIONS), "a listener refused: {rounds:?}");
-    assert!(run.median() < Duration::from_millis(20), "late by {:?} half of the time", run.median());
+    assert!(run.median() < Duration::from_millis(100), "late by {:?} half of the time", run.median());
     assert!(run.worst() < crate::common::paced::HEARTBEAT_LIMIT, "late by {:?}", run.worst());
     assert!(run.outcome.stats.samples >= 1_000 * run.late.len() as u64 - 100, "no sample is lost");
     assert_eq!(run.outcome.link.lost_samples, 0);
