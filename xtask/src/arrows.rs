@@ -4,8 +4,9 @@
 //! A file uses another if its code, tests aside, names something that the other defines. A name
 //! that a module only hands on (`pub use`) belongs to the file that defines it. A module and the
 //! modules that it is made of are one house: what it uses of them is no arrow, what they use of it
-//! is one.
+//! is one. Crates of the PC's side have eight floors at most.
 
+mod floors;
 mod included;
 mod krate;
 mod lengths;
@@ -23,6 +24,10 @@ const SKIPPED: [&str; 4] = ["target", ".git", ".venv", "node_modules"];
 /// Uses that the whole repository has at least; fewer, and the reader of sources is blind.
 const FEWEST_USES: usize = 1000;
 
+/// Most floors of a crate of the PC's side. The folders of the diagnosis are checked where they
+/// are, in `diagnosis/tests/behaviour/layout.rs`.
+const MOST_FLOORS: usize = 8;
+
 /// The uses of each file of a crate: the other file, and a name of it.
 type Uses = BTreeMap<String, BTreeMap<String, String>>;
 
@@ -30,11 +35,12 @@ type Uses = BTreeMap<String, BTreeMap<String, String>>;
 pub(crate) fn check() -> Result<(), Error> {
     let unreadable = |error: io::Error| Error::new(format!("the sources could not be read: {error}"));
     let mut count = 0;
-    let (mut circles, mut long) = (Vec::new(), Vec::new());
+    let (mut circles, mut long, mut high) = (Vec::new(), Vec::new(), Vec::new());
     for folder in crates(&shell::top()).map_err(unreadable)? {
         let uses = Crate::read(&folder.join("src")).map_err(unreadable)?.uses();
         count += uses.values().map(BTreeMap::len).sum::<usize>();
         let name = folder.strip_prefix(shell::top()).unwrap_or(&folder).display().to_string();
+        high.extend(too_high(&name, floors::floors(&uses)));
         circles.extend(circles_of(&uses).iter().map(|circle| message(&name, circle, &uses)));
         for (file, text) in krate::sources(&folder.join("src")).map_err(unreadable)? {
             let one = |long: lengths::Function| {
@@ -45,19 +51,27 @@ pub(crate) fn check() -> Result<(), Error> {
         }
     }
     let included = included::unlisted(&shell::top()).map_err(unreadable)?;
-    circles.iter().chain(&long).chain(&included).for_each(|one| eprintln!("{one}"));
+    circles.iter().chain(&long).chain(&included).chain(&high).for_each(|one| eprintln!("{one}"));
     if count < FEWEST_USES {
         return Err(Error::new(format!("only {count} uses were seen: the reader of sources is blind")));
     }
-    if circles.is_empty() && long.is_empty() && included.is_empty() {
+    if circles.is_empty() && long.is_empty() && included.is_empty() && high.is_empty() {
         return Ok(());
     }
     Err(Error::new(format!(
-        "{} circles, each printed above: move what both files need into a file below them; {} functions that are too long; {} includes",
+        "{} circles, each printed above: move what both files need into a file below them; {} functions that are too long; {} includes; {} crates that are too high",
         circles.len(),
         long.len(),
-        included.len()
+        included.len(),
+        high.len()
     )))
+}
+
+/// A crate of the PC's side with more floors than [`MOST_FLOORS`].
+fn too_high(name: &str, floors: usize) -> Option<String> {
+    (name.starts_with("host-sim") && floors > MOST_FLOORS).then(|| {
+        format!("{name}: {floors} files stand one on the other, and {MOST_FLOORS} may: take a part out of it")
+    })
 }
 
 /// Folders of the repository with a manifest and sources.
