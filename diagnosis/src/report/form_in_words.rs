@@ -158,10 +158,10 @@ impl Sheet {
 
     fn in_words(&self, other: Option<Variable>, length: &str) -> String {
         let by_speed = self.by_column();
+        if self.explained(|_, j| self.per_speed() * self.columns[j]) > PROPORTIONAL {
+            return "grows in proportion to speed, as viscous friction does".into();
+        }
         let Some(other) = other else {
-            if self.explained(|_, j| self.per_speed() * self.columns[j]) > PROPORTIONAL {
-                return "grows in proportion to speed, as viscous friction does".into();
-            }
             return along(Variable::Speed, &self.columns, &by_speed, length);
         };
         let by_other = self.by_row();
@@ -368,7 +368,10 @@ mod tests {
             of(&|x, v, _| -v * (0.1 + (-4.0 * (x - 2.0).powi(2)).exp())),
             "a force against the motion that grows with speed, by a factor that peaks at a travel of 2.000 rad"
         );
-        assert_eq!(of(&|_, v, _| -v), "a force against the motion that grows with speed");
+        assert_eq!(
+            of(&|_, v, _| -v),
+            "a force against the motion that grows in proportion to speed, as viscous friction does"
+        );
         assert!(of(&|x, v, _| (3.0 * x * v).sin()).contains("in no simple form"));
     }
 

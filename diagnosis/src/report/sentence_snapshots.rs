@@ -73,3 +73,14 @@ fn every_verdict_says_its_sentence() {
         assert_eq!(sentence(&report, Kind::Rotary), golden.trim_end(), "{:?}", report.verdict);
     }
 }
+
+#[test]
+fn a_gain_that_may_be_none_is_not_proven() {
+    let found = vec![named(N::CommandDeadband, 0.91, &[N::CommandDeadband], Vec::new())];
+    let mut report = report(Verdict::MissingPhysics, None, found);
+    report.fit.holdout_gain_ci95 = [-0.43, 0.76];
+    assert_eq!(
+        sentence(&report, Kind::Rotary),
+        "The simulation leaves out a dead band of the command (91 % sure); that this lowers the held-out force error, 20.0 %, is not proven"
+    );
+}

@@ -263,8 +263,9 @@ pub(super) fn check(logs: &[Log], choices: &[Choice]) -> Result<(), Error> {
             let at = choice.column(logs).map(|c| c.0);
             if at.is_some() && at == before.column(logs).map(|c| c.0) {
                 return Err(Error::input(format_args!(
-                    "--column gives {name} two roles, {} and {role}; a column has one, and where files have columns of one name, say whose it is: --column {role}=FILE/{name}",
-                    before.role
+                    "--column gives {name} two roles, {} and {role}; a column has one, and where files have columns of one name, say whose it is: {}",
+                    before.role,
+                    option(role, &format!("FILE/{name}"), None)
                 )));
             }
         }
