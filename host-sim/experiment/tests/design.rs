@@ -195,3 +195,20 @@ fn the_files_give_another_machine_the_predicted_motion() {
     assert!(farthest > 1.0, "it moves by {farthest} rad");
     assert!(apart < 1e-3 * farthest, "{apart} rad of {farthest} rad");
 }
+
+/// The page holds every rival with the odds of its nearest pair, the runners-up, and the curves.
+#[test]
+fn the_page_shows_rivals_odds_runners_up_and_evidence() {
+    let design = design(&delay_or_lag(), 9.0, 1).expect("the limits are wide");
+    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("experiment-page");
+    design.write(&folder).expect("there is space");
+    let page = std::fs::read_to_string(folder.join("experiment.html")).expect("it was written");
+    for rival in &design.case.rivals {
+        assert!(page.contains(&format!("({})", rival.name)), "{} is missing", rival.name);
+    }
+    assert!(page.contains(" to 1"), "the odds are missing");
+    let runners_up = design.runners_up.len();
+    assert!(runners_up > 0 && page.contains(&format!("runner-up {runners_up}")), "{runners_up} runners-up");
+    // Evidence, position and command, each with a curve a rival or more.
+    assert!(page.matches("<svg").count() >= 3 && page.matches("<path").count() >= 6, "{page}");
+}

@@ -151,7 +151,8 @@ fn what_was_fed_forward_before_stays_where_it_is_felt_less() {
     let was = outcome.as_it_was.expect("the device fed something forward").all();
     assert!(was <= outcome.before.all() / 4.0, "{was} N of {}", outcome.before.all());
     assert!(!outcome.is_compensated, "{:?} after {was} N", outcome.after.all());
-    assert!(outcome.taken_back.last().is_some_and(|why| why.contains("fed forward before")));
+    let told = outcome.taken_back.join("; ");
+    assert!(told.contains("fed forward before") && told.contains("compensate --align"), "{told}");
     assert_eq!(*line.device().plan().device(), had);
     assert!((outcome.after.all() - was).abs() < 1e-12, "it feels as it was");
 }

@@ -79,3 +79,34 @@ fn the_sentence_comes_first_and_a_fit_by_motion_says_what_it_is() {
     );
     refused(&run(&[&arguments[..], &["--export", "stl"]].concat()), 2, &["stl", "mjcf"]);
 }
+
+/// A turned sign, a wrong unit and an axis at rest: nothing is diagnosed, and scripts hear it.
+#[test]
+fn recordings_that_cannot_be_used_end_a_diagnosis_with_2() {
+    let dir = folder("unusable");
+    let light = RIG.replace("0.2\n", "0.02\n").replace("coulomb = 0.1", "coulomb = 0.02");
+    let truth = Rig::parse(&light, "truth").expect("it is a rig");
+    let path = |name: &str, content: &str| {
+        let path = dir.join(name);
+        std::fs::write(&path, content).expect("written");
+        path
+    };
+    let files = [path("fit.csv", &recorded(&truth, 0.0)), path("holdout.csv", &recorded(&truth, 2.0))];
+    let resting: String = recorded(&truth, 0.0)
+        .lines()
+        .map(|line| match line.rsplit_once(',') {
+            Some((row, counts)) if counts.parse::<f64>().is_ok() => format!("{row},7\n"),
+            _ => format!("{line}\n"),
+        })
+        .collect();
+    let rest = [path("rest.csv", &resting), files[1].clone()];
+    let of = |rig: &str, [fit, holdout]: &[std::path::PathBuf; 2], said: &[&str]| {
+        let rig = path("rig.toml", rig);
+        let out = dir.join("out");
+        let arguments = ["diagnose", "--rig", text(&rig), "--fit", text(fit), "--holdout", text(holdout)];
+        refused(&run(&[&arguments[..], &["--out", text(&out)]].concat()), 2, said);
+    };
+    of(&light.replace("gain = 1.0", "gain = -1.0"), &files, &["a sign is wrong", "actuator.gain"]);
+    of(&light.replace("gain = 1.0", "gain = 1000.0"), &files, &["thousandths", "actuator.gain"]);
+    of(&light, &rest, &["rest.csv"]);
+}

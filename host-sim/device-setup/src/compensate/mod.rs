@@ -194,6 +194,13 @@ impl<A: AsyncFnMut(Step) -> Result<(), Error>> Work<'_, '_, A> {
         let is_compensated = kept.is_some();
         if !is_compensated {
             self.bench.configure(&self.before).await?;
+            let waves = |device: &Device| (device.compensation.angle, device.compensation.ripple);
+            if self.before.compensation.needs_angle() && waves(&self.before) != waves(&full) {
+                taken_back.push(
+                    "its own waves stay off until the rotor's angle is found again: compensate --align"
+                        .into(),
+                );
+            }
         }
         Ok(Outcome {
             record: self.bench.record().await?,
