@@ -23,9 +23,9 @@ fn two_parts_of_one_jump_agree_in_sign() {
 
 const ROWS_PER_S: f64 = 5000.0;
 
-/// Returns the counts found to be lost, and the blocks' starts, s, of an axis whose reading
-/// moves by `counts`.
-fn lost(counts: impl Fn(f64) -> f64, asked: Asked) -> (Vec<f64>, Vec<f64>) {
+/// An axis that turns without force, whose reading moves by `counts`: its recording in blocks, its
+/// model, and a count in rad.
+fn turning(mut counts: impl FnMut(f64) -> f64) -> ([BlockedRecording; 1], Nominal, f64) {
     let time_s: Vec<f64> = (0..10_000).map(|row| f64::from(row) / ROWS_PER_S).collect();
     let recording = Recording {
         command: vec![0.0; time_s.len()],
@@ -34,10 +34,16 @@ fn lost(counts: impl Fn(f64) -> f64, asked: Asked) -> (Vec<f64>, Vec<f64>) {
         ..Recording::default()
     };
     let rig = Rig::of_values(0.01, 0.0, 0.0);
-    let count = 1.0 / rig.encoder.counts_per_unit;
     let mut tracks = [BlockedRecording::new(&recording, &rig)];
     tracks[0].motion.v.fill(3.0);
     let nominal = Nominal { is_balanced: true, ..Nominal::of(&rig) };
+    (tracks, nominal, 1.0 / rig.encoder.counts_per_unit)
+}
+
+/// Returns the counts found to be lost, and the blocks' starts, s, of an axis whose reading
+/// moves by `counts`.
+fn lost(counts: impl Fn(f64) -> f64, asked: Asked) -> (Vec<f64>, Vec<f64>) {
+    let (tracks, nominal, count) = turning(counts);
     let noise = Noise { sensor: 1.0, white: 1e-3, slow: 1e-9, tau: 0.1, rest: 1.0, blur: 0.0 };
     let fit = Fit::new(&Model::default(), &nominal, &tracks, &noise);
     let lost = find(&tracks[0], &fit, count, asked, None).lost;
@@ -72,19 +78,8 @@ fn jumps_that_chance_makes_cost_more_than_they_gain() {
     for seed in 1..21 {
         let mut random = Random::new(seed);
         let mut chance = || (0..12).map(|_| random.below(1000) as f64 / 1000.0).sum::<f64>() - 6.0;
-        let time_s: Vec<f64> = (0..10_000).map(|row| f64::from(row) / ROWS_PER_S).collect();
-        let recording = Recording {
-            command: vec![0.0; time_s.len()],
-            position_counts: time_s.iter().map(|t| (3000.3 * t + 3.0 * chance()).floor()).collect(),
-            time_s,
-            ..Recording::default()
-        };
-        let rig = Rig::of_values(0.01, 0.0, 0.0);
-        let count = 1.0 / rig.encoder.counts_per_unit;
-        let mut tracks = [BlockedRecording::new(&recording, &rig)];
-        tracks[0].motion.v.fill(3.0);
+        let (mut tracks, nominal, count) = turning(|t| 3000.3 * t + 3.0 * chance());
         tracks[0].motion.rest.fill(false);
-        let nominal = Nominal { is_balanced: true, ..Nominal::of(&rig) };
         let noise = Noise { sensor: 75.0, white: 1e-3, slow: 1e-9, tau: 0.1, rest: 1.0, blur: 0.0 };
         let fit = Fit::new(&Model::default(), &nominal, &tracks, &noise);
         let found = find(&tracks[0], &fit, count, any, Some(2.0 * count));

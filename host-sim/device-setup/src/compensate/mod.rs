@@ -188,7 +188,8 @@ impl<A: AsyncFnMut(Step) -> Result<(), Error>> Work<'_, '_, A> {
         } else {
             None
         };
-        let as_it_was = if was_fed { Some(self.felt_with(&Device { ..self.before }).await?) } else { None };
+        let device = self.before;
+        let as_it_was = if was_fed { Some(self.felt_with(&device).await?) } else { None };
         let (kept, mut taken_back) = self.keep_what_helps(&full, &before, angle).await?;
         let kept = unless_felt_more(kept, as_it_was.as_ref(), &mut taken_back);
         let is_compensated = kept.is_some();
