@@ -11,9 +11,9 @@
 //! tick falls.
 //!
 //! The angle is the measured tilt less what the tilt reads with the needle laid on the skin. It is
-//! smoothed over 51 ms and taken over in steps of a milliradian with three quarters of one as dead
-//! band; a layer that was touched is left only 0.2 mm further out. Noise of a milliradian therefore
-//! makes no layer come and go: at 15° it moves a vein by 0.07 mm.
+//! smoothed over 51 ms and taken over in steps of a milliradian with three quarters of one as
+//! deadband; a layer that was touched is left only 0.2 mm further out. Noise of a milliradian
+//! therefore makes no layer come and go: at 15° it moves a vein by 0.07 mm.
 
 mod layers;
 

@@ -49,7 +49,7 @@ pub enum Fault {
     EncoderJump = 0,
     /// Deeper than the travel of the needle.
     Travel = 1,
-    /// The PC has been silent for longer than the heartbeat time-out.
+    /// The PC has been silent for longer than the heartbeat timeout.
     HostSilent = 2,
     /// The tilt sensor is absent, stuck or answers nonsense.
     Tilt = 3,

@@ -23,7 +23,7 @@ fn main() {
             print!("{}", outcome.summary());
             println!("  took {:.2} s", start.elapsed().as_secs_f64());
             if let Some(dir) = arguments.get(3) {
-                outcome.write(&PathBuf::from(dir)).expect("the directory can be written");
+                outcome.write(&PathBuf::from(dir)).expect("the folder can be written");
             }
         }
         Err(error) => {

@@ -1,5 +1,5 @@
 //! Every timing constant of the firmware, each with its reason. Nothing else in this crate states a
-//! frequency, a period, a time-out or a priority.
+//! frequency, a period, a timeout or a priority.
 
 use control_core::TICK_HZ;
 

@@ -20,7 +20,7 @@ use link::{Command, DeviceFrame};
 use crate::board::Board;
 use crate::usb_host::Port;
 
-/// The period of the PC's heartbeats: a quarter of the shortest default time-out.
+/// The period of the PC's heartbeats: a quarter of the shortest default timeout.
 const HEARTBEAT_MS: u64 = 50;
 /// The longest wait of the PC for a port, and for an answer.
 const PORT_MS: u64 = 3_000;

@@ -36,7 +36,7 @@ use std::process::ExitCode;
 const HELP: &str = "\
 The project's chores.
 
-  cargo xtask test [STEP…]      everything that passes or fails, set-up included; or only the steps named:
+  cargo xtask test [STEP…]      everything that passes or fails, setup included; or only the steps named:
                                 fmt words arrows clippy firmware unit doc board wasm site browser clients fuzz
                                 prove
   cargo xtask test --quick      the inner loop: format, words, arrows, warnings, the tests inside the crates; three minutes

@@ -34,7 +34,7 @@ impl fmt::Display for Error {
 
 /// The top of the repository.
 pub(crate) fn top() -> PathBuf {
-    // Where cargo runs this crate, for clones that share a target directory share its program too.
+    // Where cargo runs this crate, for clones that share a target folder share its program too.
     let here = env::var_os("CARGO_MANIFEST_DIR").unwrap_or_else(|| env!("CARGO_MANIFEST_DIR").into());
     let top = Path::new(&here).join("..");
     top.canonicalize().unwrap_or(top)

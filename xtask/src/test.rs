@@ -1,4 +1,4 @@
-//! `cargo xtask test`: everything that passes or fails, set-up included, each step also by its own
+//! `cargo xtask test`: everything that passes or fails, setup included, each step also by its own
 //! name; and `cargo xtask nightly`, the checks that take longer than the tests may.
 
 use crate::setup;

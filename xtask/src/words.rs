@@ -1,5 +1,6 @@
-//! The word check: phrases that `words/list.rs` replaces by plain ones, doc comments that open like
-//! a question, long names of tests and wide comments.
+//! The word check: phrases that `words/list.rs` replaces by plain ones, second words for a term of
+//! `words/terms.rs`, names of files that say nothing, doc comments that open like a question, long
+//! names of tests and wide comments.
 //!
 //! Comments and string literals of Rust are read, and the whole text of Markdown, HTML, CSS,
 //! JavaScript, Python and TOML. A phrase is found in any case and across a line break, and never
@@ -7,6 +8,7 @@
 
 mod list;
 mod prose;
+mod terms;
 
 use crate::shell::{self, Error};
 use list::{OPENINGS, Phrase};
@@ -16,6 +18,7 @@ use std::collections::HashMap;
 use std::fs;
 use std::io;
 use std::path::Path;
+use terms::{FILE_NAMES, TERMS, Term};
 
 /// Folders without prose of ours: what is built, and what git keeps.
 const SKIPPED: [&str; 4] = ["target", ".git", ".venv", "node_modules"];
@@ -23,8 +26,8 @@ const SKIPPED: [&str; 4] = ["target", ".git", ".venv", "node_modules"];
 const LONGEST_NAME: usize = 60;
 /// The widest comment in Rust, in columns.
 const WIDEST_COMMENT: usize = 100;
-/// The list names what it bans.
-const LIST: &str = "xtask/src/words/list.rs";
+/// The lists name what they ban.
+const LISTS: [&str; 2] = ["xtask/src/words/list.rs", "xtask/src/words/terms.rs"];
 
 /// Checks every file of the repository, prints each finding, and fails if there is one.
 pub(crate) fn check() -> Result<(), Error> {
@@ -36,8 +39,9 @@ pub(crate) fn check() -> Result<(), Error> {
         return Ok(());
     }
     Err(Error::new(format!(
-        "{} phrases to rewrite, each printed above with what to write instead; {LIST} lists them with reasons",
-        findings.len()
+        "{} words to change, each printed above with what to write instead; {} list them with reasons",
+        findings.len(),
+        LISTS.join(" and ")
     )))
 }
 
@@ -51,33 +55,50 @@ fn visit(folder: &Path, path: &str, findings: &mut Vec<String>) -> io::Result<()
         let Some(name) = name.to_str() else { continue };
         let below = if path.is_empty() { name.to_string() } else { format!("{path}/{name}") };
         let kind = entry.file_type()?;
-        if kind.is_dir() && !SKIPPED.contains(&name) {
+        if SKIPPED.contains(&name) {
+            continue;
+        }
+        findings.extend(file_name(name).map(|plain| format!("{below}: name it {plain}")));
+        if kind.is_dir() {
             visit(&entry.path(), &below, findings)?;
-        } else if kind.is_file() && below != LIST {
+        } else if kind.is_file() && !LISTS.contains(&below.as_str()) {
             let Some(prose) = prose::reader(name) else { continue };
             let Ok(text) = fs::read_to_string(entry.path()) else { continue };
-            findings.extend(phrases(&prose(&text), list::PHRASES).iter().map(|found| found.message(&below)));
-            if name.ends_with(".rs") {
-                findings.extend(long_names(&text).into_iter().map(|(line, name)| {
-                    format!("{below}:{line}: {name}: say what holds in at most {LONGEST_NAME} characters")
-                }));
-                findings.extend(
-                    wide(&text)
-                        .into_iter()
-                        .map(|line| format!("{below}:{line}: wrap this comment at {WIDEST_COMMENT} columns")),
-                );
-            }
-            if [".rs", ".js"].iter().any(|end| name.ends_with(end)) {
-                findings.extend(openings(&text).into_iter().map(|(line, word)| {
-                    format!(
-                        "{below}:{line}: a doc comment opens with \"{word}\": write a sentence, such as \"Returns …\", \"True if …\" or \
-                         \"The time constant of …, in s\""
-                    )
-                }));
-            }
+            check_text(&below, &text, &prose(&text), findings);
         }
     }
     Ok(())
+}
+
+/// Appends the findings in the text of one file, whose words are `words`.
+fn check_text(path: &str, text: &str, words: &[Word], findings: &mut Vec<String>) {
+    findings.extend(phrases(words, list::PHRASES).iter().map(|found| found.message(path)));
+    findings.extend(synonyms(words, TERMS).iter().map(|found| found.message(path)));
+    if path.ends_with(".rs") {
+        findings.extend(long_names(text).into_iter().map(|(line, name)| {
+            format!("{path}:{line}: {name}: say what holds in at most {LONGEST_NAME} characters")
+        }));
+        findings.extend(
+            wide(text)
+                .into_iter()
+                .map(|line| format!("{path}:{line}: wrap this comment at {WIDEST_COMMENT} columns")),
+        );
+    }
+    if [".rs", ".js"].iter().any(|end| path.ends_with(end)) {
+        findings.extend(openings(text).into_iter().map(|(line, word)| {
+            format!(
+                "{path}:{line}: a doc comment opens with \"{word}\": write a sentence, such as \"Returns …\", \"True if …\" or \
+                 \"The time constant of …, in s\""
+            )
+        }));
+    }
+}
+
+/// Returns the name that replaces that of a file or folder, if it is one of [`FILE_NAMES`].
+fn file_name(name: &str) -> Option<&'static str> {
+    let stem = name.split('.').next()?;
+    let is_code = !name.contains('.') || name.ends_with(".rs") || name.ends_with(".js");
+    FILE_NAMES.iter().find(|(banned, _)| is_code && *banned == stem).map(|(_, plain)| *plain)
 }
 
 /// A phrase of the list in a text.
@@ -93,21 +114,49 @@ impl Found<'_> {
     }
 }
 
+/// Another word for a term in a text.
+struct Synonym<'a> {
+    line: usize,
+    word: &'a str,
+    term: &'a Term,
+}
+
+impl Synonym<'_> {
+    fn message(&self, path: &str) -> String {
+        let Term { term, meaning, .. } = self.term;
+        format!("{path}:{}: \"{}\": the term is \"{term}\" ({meaning})", self.line, self.word)
+    }
+}
+
 /// Returns every occurrence of the phrases of `list`, in the order of the text.
 fn phrases<'a>(words: &[Word], list: &'a [Phrase]) -> Vec<Found<'a>> {
-    let mut by_first: HashMap<&str, Vec<(Vec<&str>, &Phrase)>> = HashMap::new();
-    for phrase in list {
-        let mut banned = phrase.banned.split(' ');
-        let first = banned.next().unwrap_or_default();
-        by_first.entry(first).or_default().push((banned.collect(), phrase));
+    let banned = list.iter().map(|phrase| (phrase.banned, phrase));
+    occurrences(words, banned).into_iter().map(|(line, _, phrase)| Found { line, phrase }).collect()
+}
+
+/// Returns every occurrence of another word for a term of `list`, in the order of the text.
+fn synonyms<'a>(words: &[Word], list: &'a [Term]) -> Vec<Synonym<'a>> {
+    let banned = list.iter().flat_map(|term| term.not.iter().map(move |word| (*word, term)));
+    occurrences(words, banned).into_iter().map(|(line, word, term)| Synonym { line, word, term }).collect()
+}
+
+/// Returns every occurrence of the banned texts with its line, the text and its entry of a list.
+fn occurrences<'a, T>(
+    words: &[Word],
+    banned: impl Iterator<Item = (&'a str, &'a T)>,
+) -> Vec<(usize, &'a str, &'a T)> {
+    let mut by_first: HashMap<&str, Vec<(&str, &T)>> = HashMap::new();
+    for (text, entry) in banned {
+        by_first.entry(text.split(' ').next().unwrap_or_default()).or_default().push((text, entry));
     }
     let mut found = Vec::new();
     for (at, first) in words.iter().enumerate() {
-        for (rest, phrase) in by_first.get(first.text.as_str()).into_iter().flatten() {
+        for (text, entry) in by_first.get(first.text.as_str()).into_iter().flatten() {
+            let rest: Vec<_> = text.split(' ').skip(1).collect();
             let follows = words[at + 1..].iter().take(rest.len()).filter(|word| word.follows);
-            let same = follows.zip(rest).filter(|(word, banned)| is_same(&word.text, banned));
+            let same = follows.zip(&rest).filter(|(word, banned)| is_same(&word.text, banned));
             if same.count() == rest.len() {
-                found.push(Found { line: first.line, phrase });
+                found.push((first.line, *text, *entry));
             }
         }
     }
@@ -213,6 +262,42 @@ mod tests {
         let words = prose::reader("a.md").expect("a kind of file with prose")("x\nverily");
         let found = phrases(&words, &LIST);
         assert_eq!(found[0].message("docs/a.md"), "docs/a.md:2: \"verily\": write \"indeed\" (younger)");
+    }
+
+    #[test]
+    fn a_second_word_for_a_term_is_found_with_the_term() {
+        let list = [Term { term: "rotor", meaning: "it turns", not: &["turning part", "spinner"] }];
+        let words =
+            prose::reader("a.md").expect("a kind of file with prose")("a rotor\na turning\npart, a spinner");
+        let found: Vec<_> = synonyms(&words, &list).iter().map(|found| found.message("a.md")).collect();
+        assert_eq!(
+            found,
+            [
+                "a.md:2: \"turning part\": the term is \"rotor\" (it turns)",
+                "a.md:3: \"spinner\": the term is \"rotor\" (it turns)"
+            ]
+        );
+    }
+
+    #[test]
+    fn a_file_has_the_name_of_its_content() {
+        assert_eq!(file_name("written.rs"), Some("writer"));
+        assert_eq!(file_name("bedside"), Some("patient_manager"), "a folder");
+        assert_eq!(file_name("rewritten.rs"), None);
+        assert_eq!(file_name("sheet.xlsx"), None, "a recording has the name that it came with");
+    }
+
+    #[test]
+    fn a_term_is_not_a_second_word_for_another() {
+        let words = |term: &Term| term.not.iter().map(|word| (*word).to_owned()).collect::<Vec<_>>();
+        let banned: Vec<String> = TERMS.iter().flat_map(words).collect();
+        for (at, word) in banned.iter().enumerate() {
+            assert_eq!(*word, word.to_lowercase());
+            assert!(!banned[..at].contains(word), "{word} is listed twice");
+        }
+        for Term { term, meaning, .. } in TERMS {
+            assert!(!banned.iter().any(|word| word == term) && !meaning.is_empty(), "{term}");
+        }
     }
 
     #[test]

@@ -55,7 +55,7 @@ impl EffectReport for Defined {
         Subsystem::Actuator
     }
     fn words(&self) -> &'static str {
-        "a dead band of the command"
+        "a deadband of the command"
     }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         vec![Reported::new("half_width", fitted.shape("half_width"), fitted.command.clone())]

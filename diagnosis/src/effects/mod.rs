@@ -299,7 +299,7 @@ impl Effect {
         values.filter(move |(key, value)| !is_of_waves(key) && *value != 0.0)
     }
 
-    /// Returns the largest command that does nothing, in units of command, where a dead band shifts
+    /// Returns the largest command that does nothing, in units of command, where a deadband shifts
     /// what is beyond it; `None` for every other effect.
     pub fn shifted_dead_band(&self) -> Option<f64> {
         let is_one = self.name == EffectName::CommandDeadband;

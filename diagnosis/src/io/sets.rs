@@ -4,7 +4,7 @@ use crate::io::error::InputError;
 use crate::io::recording::Recording;
 use crate::io::rig::Rig;
 
-/// Refuses one recording as fit and hold-out, and a key of the rig that has no column to act on.
+/// Refuses one recording as fit and holdout, and a key of the rig that has no column to act on.
 pub(crate) fn check(rig: &Rig, fit: &[Recording], holdout: &[Recording]) -> Result<(), InputError> {
     for held in holdout {
         if let Some(same) = fit.iter().find(|f| is_same(f, held)) {

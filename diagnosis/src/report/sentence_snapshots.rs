@@ -81,6 +81,6 @@ fn a_gain_that_may_be_none_is_not_proven() {
     report.fit.holdout_gain_ci95 = [-0.43, 0.76];
     assert_eq!(
         sentence(&report, Kind::Rotary),
-        "The simulation leaves out a dead band of the command (91 % sure); that this lowers the held-out force error, 20.0 %, is not proven"
+        "The simulation leaves out a deadband of the command (91 % sure); that this lowers the held-out force error, 20.0 %, is not proven"
     );
 }

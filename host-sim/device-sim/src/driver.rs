@@ -2,7 +2,7 @@
 //! time and handed bytes.
 //!
 //! On a new connection it says hello, stops the device, configures it, and starts it only where a
-//! person asks: no set point of an earlier connection is ever played again. Commands are repeated
+//! person asks: no set value of an earlier connection is ever played again. Commands are repeated
 //! until they are answered; a heartbeat says every 50 ms that the PC lives.
 
 use control_core::compensation::Gains;

@@ -1,10 +1,10 @@
 //! The choice of the input: segments are added one after another, each the one that best tells the
 //! rivals apart together with those before it.
 
+use crate::candidates::candidates;
 use crate::case::{Case, Rival};
 use crate::innovation::{Filter, Gram, Unexpected};
 use crate::input::{Input, Segment, Servo};
-use crate::library::library;
 use crate::predict::Prediction;
 use rayon::prelude::*;
 
@@ -217,7 +217,7 @@ pub fn design(case: &Case, most_s: f64, seed: u64) -> Result<Design, String> {
     let servo = Servo::within(case.rivals[0].rig.model.inertia, &case.limits.usable());
     let bench = Bench { case, filter: Filter::new(case), servo };
     let segments: Vec<Segment> =
-        library(case, seed).into_iter().filter(|segment| segment.seconds <= most_s).collect();
+        candidates(case, seed).into_iter().filter(|segment| segment.seconds <= most_s).collect();
     let tried = segments.len();
     let beyond = |which: &str| {
         let Limit { travel, speed, force } = words(case);

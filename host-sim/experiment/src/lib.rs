@@ -8,17 +8,17 @@
 //! 1967). Effects are those of the diagnosis itself. Lengths are in rad or m, forces in N·m or N,
 //! times in s.
 
+mod candidates;
 mod case;
 mod choose;
 mod innovation;
 mod input;
-mod library;
 mod page;
 mod predict;
 mod write;
 
+pub use candidates::random_multisine;
 pub use case::{Case, Limits, Rival};
 pub use choose::{Alternative, Design, Pair, design};
 pub use input::{Input, Segment, Servo, Signal};
-pub use library::random_multisine;
 pub use predict::Prediction;

@@ -2,7 +2,7 @@
 
 use clap::Args;
 use device_sim::error::Error;
-use device_sim::profile::{InBody, Profile};
+use device_sim::profile::{Entry, InBody, Profile};
 use serde_json::json;
 
 /// List what a needle meets on a straight line into a body: structures with mm along the needle,
@@ -36,22 +36,15 @@ pub struct Layers {
 
 impl Layers {
     pub(crate) fn run(self) -> Result<(), Error> {
-        let given = |keys: &[(&'static str, Option<f64>)]| -> Vec<(&'static str, f64)> {
-            keys.iter().filter_map(|(key, value)| Some((*key, (*value)?))).collect()
+        let entry = Entry {
+            along_mm: self.along,
+            around_deg: self.around,
+            azimuth_deg: self.azimuth,
+            turn_deg: self.turn,
+            angle_deg: self.angle,
         };
-        let body = given(&[
-            ("along_mm", self.along),
-            ("around_deg", self.around),
-            ("azimuth_deg", self.azimuth),
-            ("turn_deg", self.turn),
-        ]);
-        let profile = Profile::find(&self.profile)?.with_keys(&given(&[("entry_deg", self.angle)]), &body)?;
-        let Some(body) = &profile.body else {
-            return Err(Error::input(format_args!(
-                "{}: this patient is layers without a body; choose one with [body], such as forearm",
-                self.profile
-            )));
-        };
+        let profile = Profile::find(&self.profile)?.entered(&entry)?;
+        let Some(body) = &profile.body else { return Ok(()) };
         if self.json {
             println!("{}", as_json(&profile, body));
         } else {

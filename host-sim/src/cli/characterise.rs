@@ -5,7 +5,7 @@ use clap::Args;
 use device_sim::error::Error;
 use diagnosis::rig::Rig;
 use lab::characterise::mechanism::BareDevice;
-use lab::characterise::{self, News, programme, written};
+use lab::characterise::{self, News, programme, writer};
 use live::progress::Progress;
 use live::serial::SerialPort;
 use live::serving::stop_on_signals;
@@ -44,7 +44,7 @@ impl Characterise {
     pub(crate) fn run(self) -> Result<(), Error> {
         let config = characterise::configuration();
         let hello = characterise::scale(&config)?;
-        let nominal = written::nominal_rig(&hello);
+        let nominal = writer::nominal_rig(&hello);
         let programmes = programme::programmes(&nominal, hello.roller_radius_mm);
         characterise::check(&config, &programmes)?;
         let mut bar = Progress::new("playing");
@@ -76,7 +76,7 @@ impl Characterise {
             characterise::on_port(&mut port, &programmes, &stop, news)?
         };
         drop(bar);
-        for path in written::write_all(&self.out, &tracks)? {
+        for path in writer::write_all(&self.out, &tracks)? {
             say!("{}", path.display());
         }
         for track in &tracks {

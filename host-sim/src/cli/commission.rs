@@ -6,7 +6,7 @@ use clap::Args;
 use device_sim::device::Port;
 use device_sim::error::Error;
 use lab::characterise::mechanism::Wiring;
-use lab::characterise::{self, written};
+use lab::characterise::{self, writer};
 use lab::commission::bench::{GuidedLine, Line, WireLine};
 use lab::commission::mechanism::VirtualLine;
 use lab::commission::{self, Outcome, Step, Wish};
@@ -93,7 +93,7 @@ impl Commission {
 
     fn on_virtual(&self, wish: &Wish, consent: &Consent) -> Result<Outcome, Error> {
         let scale = characterise::scale(&characterise::configuration())?;
-        let rig = written::nominal_rig(&scale);
+        let rig = writer::nominal_rig(&scale);
         let line = VirtualLine::new(&rig, "the nominal rig", Wiring::default(), scale.roller_radius_mm)?;
         on(line, wish, consent)
     }

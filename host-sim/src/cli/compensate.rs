@@ -5,7 +5,7 @@ use clap::Args;
 use device_sim::device::Port;
 use device_sim::error::Error;
 use diagnosis::rig::Rig;
-use lab::characterise::{self, written};
+use lab::characterise::{self, writer};
 use lab::commission::bench::{GuidedLine, Line, WireLine};
 use lab::commission::mechanism::VirtualLine;
 use lab::compensate::{self, Step, Wish, files};
@@ -84,7 +84,7 @@ impl Compensate {
         let scale = characterise::scale(&characterise::configuration())?;
         let (plant, file) = match &self.plant {
             Some(path) => (Rig::read(path).map_err(Error::input)?, path.display().to_string()),
-            None => (written::nominal_rig(&scale), "the nominal rig".to_owned()),
+            None => (writer::nominal_rig(&scale), "the nominal rig".to_owned()),
         };
         VirtualLine::commissioned(&plant, &file, scale.roller_radius_mm)
     }

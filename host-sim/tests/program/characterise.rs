@@ -11,7 +11,7 @@ use fixed::types::{I8F24, I16F16};
 use lab::characterise::mechanism::BareDevice;
 use lab::characterise::programme::{Programme, Step};
 use lab::characterise::sequencer::Sequencer;
-use lab::characterise::{self, programme, written};
+use lab::characterise::{self, programme, writer};
 use link::codec::{self, Decoder, MAX_FRAME};
 use link::frames::{Ack, CommandRefusal, DeviceFrame, HostFrame, Numbered};
 use std::path::PathBuf;
@@ -21,7 +21,7 @@ use std::time::Duration;
 fn find(hidden: Option<Effect>, folder: &str) -> diagnosis::Outcome {
     let config = characterise::configuration();
     let scale = characterise::scale(&config).expect("the default configuration is sound");
-    let nominal = written::nominal_rig(&scale);
+    let nominal = writer::nominal_rig(&scale);
     let programmes = programme::programmes(&nominal, scale.roller_radius_mm);
     characterise::check(&config, &programmes).expect("every excitation is within the limits");
     let mut truth = nominal.clone();
@@ -29,7 +29,7 @@ fn find(hidden: Option<Effect>, folder: &str) -> diagnosis::Outcome {
     let mut device = BareDevice::new(&truth, "the test's rig").expect("rotary, in DAC steps");
     let tracks = characterise::on_virtual(&mut device, &programmes, |_| {}).expect("nothing trips");
     let dir = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(folder);
-    let paths = written::write_all(&dir, &tracks).expect("the folder can be written");
+    let paths = writer::write_all(&dir, &tracks).expect("the folder can be written");
     let [rig, fit, fit2, holdout] = &paths[..] else { panic!("{paths:?}") };
     let request = diagnosis::Request {
         rig: rig.clone(),
@@ -88,7 +88,7 @@ fn three_steps() -> Vec<Step> {
 #[test]
 fn steps_without_a_prompt_play_as_one_sequence() {
     let mut device = BareDevice::new(
-        &written::nominal_rig(&characterise::scale(&characterise::configuration()).expect("sound")),
+        &writer::nominal_rig(&characterise::scale(&characterise::configuration()).expect("sound")),
         "the test's rig",
     )
     .expect("rotary, in DAC steps");

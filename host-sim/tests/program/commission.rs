@@ -4,7 +4,7 @@ use control_core::Device;
 use device_sim::error::Error;
 use diagnosis::rig::Rig;
 use lab::characterise::mechanism::{Channel, Wiring};
-use lab::characterise::{self, written};
+use lab::characterise::{self, writer};
 use lab::commission::mechanism::VirtualLine;
 use lab::commission::{self, Outcome, Step, Wish};
 
@@ -13,7 +13,7 @@ const WISH: Wish = Wish { turns: 5, pull_mm: 100.0, counts_per_turn: None };
 
 fn rig() -> Rig {
     let scale = characterise::scale(&characterise::configuration()).expect("the default is sound");
-    written::nominal_rig(&scale)
+    writer::nominal_rig(&scale)
 }
 
 fn commission_on(rig: &Rig, wiring: Wiring, tilt: (f64, f64)) -> (Result<Outcome, Error>, Vec<Step>, Device) {

@@ -108,7 +108,7 @@ fn torque_ends_with_the_pc_and_does_not_return_with_it() {
     bench.driver.connected(now);
     bench.run(2_000, |_| {});
     assert!(bench.driver.is_ready(bench.now()));
-    assert!(!bench.device.is_enabled(), "no set point of an earlier connection");
+    assert!(!bench.device.is_enabled(), "no set value of an earlier connection");
     bench.driver.start();
     bench.run(100, |_| {});
     assert!(bench.device.is_enabled());

@@ -171,7 +171,7 @@ impl Segment {
 }
 
 /// A digital loop on counts: proportional, derivative on a filtered difference, integral, and
-/// feed-forward of the nominal inertia, viscosity and dry friction where it is switched on. With a
+/// feedforward of the nominal inertia, viscosity and dry friction where it is switched on. With a
 /// small `kp` it is a velocity loop with integral action.
 #[derive(Clone, Debug)]
 pub(crate) struct Loop {

@@ -62,7 +62,7 @@ fn a_dead_band_that_leaks_is_inverted() {
     for leak in [0.1, 0.4] {
         let (original, changed, _) = concealed(Law::Deadband(leak), 0.3);
         let passed = |sent: f64| leak * sent + (1.0 - leak) * (sent - sent.clamp(-0.3, 0.3));
-        assert_mapped("dead band", (&original, &changed), passed);
+        assert_mapped("deadband", (&original, &changed), passed);
     }
 }
 

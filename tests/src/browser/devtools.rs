@@ -9,7 +9,7 @@ use tungstenite::{Message, WebSocket};
 
 /// Longest wait for an answer.
 const ANSWER_TIMEOUT: Duration = Duration::from_secs(30);
-/// Wait for one message, so that a time-out is noticed.
+/// Wait for one message, so that a timeout is noticed.
 const READ_TIMEOUT: Duration = Duration::from_millis(50);
 
 /// A connection to the browser, or to one tab once attached to it.

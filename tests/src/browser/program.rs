@@ -13,7 +13,7 @@ const START: Duration = Duration::from_secs(60);
 /// The locations of programs and pages, relative to the test itself:
 /// `target/release/deps/browser-…`.
 pub struct Places {
-    /// The target directory.
+    /// The target folder.
     pub target: PathBuf,
     /// `host-sim` of the same build.
     pub program: PathBuf,
@@ -23,7 +23,7 @@ impl Places {
     /// Looks for them; the error says what to run where the program is not there.
     pub fn find() -> Result<Self, Error> {
         let own = std::env::current_exe().map_err(|e| e.to_string())?;
-        let profile = own.ancestors().nth(2).ok_or("the test is not in a target directory")?;
+        let profile = own.ancestors().nth(2).ok_or("the test is not in a target folder")?;
         let program = profile.join(format!("host-sim{}", std::env::consts::EXE_SUFFIX));
         if !program.exists() {
             let at = program.display();

@@ -8,7 +8,7 @@ use device_sim::named_files::Text;
 use device_sim::page::guide::GuideAnswer;
 use diagnosis::rig::Rig;
 use lab::characterise::mechanism::Wiring;
-use lab::characterise::{self, written};
+use lab::characterise::{self, writer};
 use lab::commission::bench::{Act, Line};
 use lab::commission::mechanism::VirtualLine;
 use link::Command;
@@ -31,7 +31,7 @@ const TASK: Task = Task::Commission { turns: 5, pull_mm: 100.0, counts_per_turn:
 pub(crate) fn uncommissioned() -> VirtualLine {
     let scale = characterise::scale(&characterise::configuration()).expect("the default scale");
     let wiring = Wiring { leads_reversed: true, ..Wiring::default() };
-    VirtualLine::new(&written::nominal_rig(&scale), "the nominal rig", wiring, scale.roller_radius_mm)
+    VirtualLine::new(&writer::nominal_rig(&scale), "the nominal rig", wiring, scale.roller_radius_mm)
         .expect("the nominal rig is sound")
 }
 

@@ -43,7 +43,7 @@ fn probe_is_recorded(program: &Path, file: &Path) -> Result<(), Error> {
     if most > 0.2 && least < most { Ok(()) } else { Err(format!("shares of the tip seen: {shares:?}")) }
 }
 
-/// The folder's page: in the target directory, or where `cargo xtask site` put it for this one.
+/// The folder's page: in the target folder, or where `cargo xtask site` put it for this one.
 fn site(target: &Path) -> Result<String, Error> {
     let page: PathBuf = target.join("site/index.html");
     if page.exists() {

@@ -9,7 +9,7 @@ use crate::estimation::nominal::Nominal;
 use crate::estimation::regressors::effect_inputs;
 use std::sync::OnceLock;
 
-/// Part of a dead band over which its inverse rises from one side to the other.
+/// Part of a deadband over which its inverse rises from one side to the other.
 const RAMP: f64 = 0.3;
 /// Bounds of the coefficient of a law of the command, which is one if the shape alone is right.
 pub(crate) const AS_IT_IS: (f64, f64) = (0.75, 1.33);

@@ -4,7 +4,7 @@
 
 pub mod angle;
 pub mod coefficients;
-pub mod felt;
+pub mod residual_force;
 pub mod step;
 pub mod weight;
 
@@ -18,9 +18,9 @@ use control_core::units::{Millimetres, MillimetresPerSecond, MillinewtonMetres};
 use control_core::{Device, Patient, Plan};
 use device_sim::error::Error;
 use diagnosis::rig::Rig;
-use felt::Felt;
 use fixed::types::I16F16;
 use link::commissioning::Record;
+use residual_force::ResidualForce;
 use std::f64::consts::TAU;
 use std::time::Duration;
 pub use step::{Part, Step};
@@ -50,12 +50,12 @@ pub struct Outcome {
     /// The rotor's angle, if any part depends on it.
     pub angle: Option<angle::Angle>,
     /// The force of the mechanism that a hand would feel without compensation.
-    pub before: Felt,
+    pub before: ResidualForce,
     /// The force that it felt before, with what the device fed forward; none where it fed nothing
     /// forward.
-    pub as_it_was: Option<Felt>,
+    pub as_it_was: Option<ResidualForce>,
     /// The force that it feels with what the device feeds forward now.
-    pub after: Felt,
+    pub after: ResidualForce,
     /// The weight that was measured because the report had none, in mN·m.
     pub weight_mnm: Option<f64>,
     /// The findings that cannot be fed forward, a sentence each.
@@ -165,7 +165,7 @@ struct Work<'a, 'b, A> {
 /// A device as it was tried, and what a hand would feel of it.
 struct Trial {
     device: Device,
-    felt: Felt,
+    residual: ResidualForce,
 }
 
 impl<A: AsyncFnMut(Step) -> Result<(), Error>> Work<'_, '_, A> {
@@ -182,14 +182,14 @@ impl<A: AsyncFnMut(Step) -> Result<(), Error>> Work<'_, '_, A> {
         let bare = play(self.bench, &turns, &hold).await?;
         let weight_mnm = level.and_then(|level| self.take_weight(&level, &bare.0));
         let full = Device { compensation: self.found.compensation, ..self.before };
-        let before = felt::felt(&plan(&full)?, (&turns, &bare.0), (&hold, &bare.1))?;
+        let before = residual_force::measure(&plan(&full)?, (&turns, &bare.0), (&hold, &bare.1))?;
         let angle = if self.found.compensation.needs_angle() {
             Some(find_angle(&full, &self.found, &bare.0)?)
         } else {
             None
         };
         let device = self.before;
-        let as_it_was = if was_fed { Some(self.felt_with(&device).await?) } else { None };
+        let as_it_was = if was_fed { Some(self.residual_with(&device).await?) } else { None };
         let (kept, mut taken_back) = self.keep_what_helps(&full, &before, angle).await?;
         let kept = unless_felt_more(kept, as_it_was.as_ref(), &mut taken_back);
         let is_compensated = kept.is_some();
@@ -208,7 +208,7 @@ impl<A: AsyncFnMut(Step) -> Result<(), Error>> Work<'_, '_, A> {
             angle,
             before,
             as_it_was,
-            after: kept.map_or(as_it_was.unwrap_or(before), |kept| kept.felt),
+            after: kept.map_or(as_it_was.unwrap_or(before), |kept| kept.residual),
             weight_mnm,
             left_out: std::mem::take(&mut self.found.left_out),
             taken_back,
@@ -260,14 +260,14 @@ impl<A: AsyncFnMut(Step) -> Result<(), Error>> Work<'_, '_, A> {
     async fn keep_what_helps(
         &mut self,
         full: &Device,
-        before: &Felt,
+        before: &ResidualForce,
         angle: Option<angle::Angle>,
     ) -> Result<(Option<Trial>, Vec<String>), Error> {
         let (turns, hold) = excitations(self.found.inertia, full.roller_radius.0.to_num(), true);
         let trial_s = seconds(&turns) + seconds(&hold);
         let mut taken_back = Vec::new();
         let mut kept = self.try_it(full, angle, Step::After).await?;
-        while excess(before, &kept.felt) > 0.0 {
+        while excess(before, &kept.residual) > 0.0 {
             let mut best: Option<(Part, Trial)> = None;
             let fed = |device: &Device| Part::ALL.map(|part| (part, part.is_fed(&device.compensation)));
             let parts: Vec<Part> =
@@ -281,22 +281,22 @@ impl<A: AsyncFnMut(Step) -> Result<(), Error>> Work<'_, '_, A> {
                 let mut device = kept.device;
                 *part.gain(&mut device.compensation.gains) = Gain(0);
                 let trial = self.try_it(&device, angle, Step::Without(part)).await?;
-                let order = |felt: &Felt| (excess(before, felt), felt.all());
-                if best.as_ref().is_none_or(|(_, other)| order(&trial.felt) < order(&other.felt)) {
+                let order = |residual: &ResidualForce| (excess(before, residual), residual.all());
+                if best.as_ref().is_none_or(|(_, other)| order(&trial.residual) < order(&other.residual)) {
                     best = Some((part, trial));
                 }
             }
             let Some((part, trial)) = best else {
-                taken_back.extend(parts.into_iter().map(|part| said(part, before, &kept.felt)));
+                taken_back.extend(parts.into_iter().map(|part| said(part, before, &kept.residual)));
                 return Ok((None, taken_back));
             };
-            taken_back.push(said(part, before, &kept.felt));
+            taken_back.push(said(part, before, &kept.residual));
             kept = trial;
         }
-        if kept.felt.all() >= before.all() {
+        if kept.residual.all() >= before.all() {
             taken_back.push(format!(
                 "all of it was taken back: with it the hand felt {:.1} mN rms, {:.1} before",
-                kept.felt.all() * 1e3,
+                kept.residual.all() * 1e3,
                 before.all() * 1e3
             ));
             return Ok((None, taken_back));
@@ -315,16 +315,16 @@ impl<A: AsyncFnMut(Step) -> Result<(), Error>> Work<'_, '_, A> {
         (self.ask)(step).await?;
         self.bench.settle().await?;
         self.configure(device, angle).await?;
-        let felt = self.felt_with(device).await?;
-        Ok(Trial { device: *device, felt })
+        let residual = self.residual_with(device).await?;
+        Ok(Trial { device: *device, residual })
     }
 
     /// Plays the turns and the hold with what `device`, as which it is configured, feeds forward.
-    async fn felt_with(&mut self, device: &Device) -> Result<Felt, Error> {
+    async fn residual_with(&mut self, device: &Device) -> Result<ResidualForce, Error> {
         let radius = device.roller_radius.0.to_num::<f64>();
         let (turns, hold) = excitations(self.found.inertia, radius, true);
         let fed = play(self.bench, &turns, &hold).await?;
-        felt::felt(&plan(device)?, (&turns, &fed.0), (&hold, &fed.1))
+        residual_force::measure(&plan(device)?, (&turns, &fed.0), (&hold, &fed.1))
     }
 
     async fn configure(&mut self, device: &Device, angle: Option<angle::Angle>) -> Result<(), Error> {
@@ -340,31 +340,31 @@ impl<A: AsyncFnMut(Step) -> Result<(), Error>> Work<'_, '_, A> {
 /// A trial, unless the hand felt less with what the device fed forward before.
 fn unless_felt_more(
     trial: Option<Trial>,
-    as_it_was: Option<&Felt>,
+    as_it_was: Option<&ResidualForce>,
     taken_back: &mut Vec<String>,
 ) -> Option<Trial> {
-    let (Some(felt), Some(was)) = (trial.as_ref().map(|trial| trial.felt.all()), as_it_was) else {
+    let (Some(residual), Some(was)) = (trial.as_ref().map(|trial| trial.residual.all()), as_it_was) else {
         return trial;
     };
-    if felt < was.all() {
+    if residual < was.all() {
         return trial;
     }
     taken_back.push(format!(
         "all of it was taken back: with it the hand felt {:.1} mN rms, and {:.1} with what the device fed forward before",
-        felt * 1e3,
+        residual * 1e3,
         was.all() * 1e3
     ));
     None
 }
 
 /// By how much the phases that are felt more than before are so, beyond what two runs differ, in N.
-fn excess(before: &Felt, after: &Felt) -> f64 {
+fn excess(before: &ResidualForce, after: &ResidualForce) -> f64 {
     let phases = before.phases().into_iter().zip(after.phases());
     phases.map(|((_, was), (_, is))| (is - was - f64::max(REPEATS_N, REPEATS_SHARE * was)).max(0.0)).sum()
 }
 
 /// Returns the reason why a part was undone, in a sentence.
-fn said(part: Part, before: &Felt, after: &Felt) -> String {
+fn said(part: Part, before: &ResidualForce, after: &ResidualForce) -> String {
     let phases = before.phases().into_iter().zip(after.phases());
     let worst = phases.max_by(|a, b| (a.1.1 - a.0.1).total_cmp(&(b.1.1 - b.0.1)));
     worst.map_or_else(String::new, |((name, was), (_, is))| {

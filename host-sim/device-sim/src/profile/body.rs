@@ -2,9 +2,9 @@
 //! turn of the limb. The layers of the file then say what each tissue feels like, and the line
 //! through the body says which are met and where.
 
-use super::{File, Layer, Profile, TissueName};
+use super::{File, Layer, Profile, TissueName, check_angle};
 use crate::error::Error;
-use crate::named_files::Text;
+use crate::named_files::{self, Text};
 use crate::session::{SceneBody, SceneOutline};
 use anatomy::{Body, Line, Piece, Place, Site, Tissue};
 use control_core::config::MAX_LAYERS;
@@ -43,6 +43,35 @@ pub(super) struct Written {
     fat_mm: Option<f64>,
 }
 
+/// The options of a command that change where and how a needle enters a body; without one, the
+/// patient's file says it.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Entry {
+    /// `--along`: the point of entry along the limb, mm.
+    pub along_mm: Option<f64>,
+    /// `--around`: the point of entry around the limb from its top, degrees.
+    pub around_deg: Option<f64>,
+    /// `--azimuth`: the needle's direction seen from above, degrees.
+    pub azimuth_deg: Option<f64>,
+    /// `--turn`: the turn of the limb about its axis, degrees.
+    pub turn_deg: Option<f64>,
+    /// `--angle`: the needle's inclination below the horizontal, 5 to 90 degrees.
+    pub angle_deg: Option<f64>,
+}
+
+impl Entry {
+    /// Refuses values out of range at a site, by the names of the options.
+    fn check(&self, site: Site) -> Result<(), String> {
+        self.along_mm.map_or(Ok(()), |mm| check_along("--along", mm, site))?;
+        for (option, degrees) in
+            [("--around", self.around_deg), ("--azimuth", self.azimuth_deg), ("--turn", self.turn_deg)]
+        {
+            degrees.map_or(Ok(()), |degrees| check_direction(option, degrees))?;
+        }
+        self.angle_deg.map_or(Ok(()), |degrees| check_angle("--angle", degrees))
+    }
+}
+
 /// The body that a needle enters, its way and what it meets.
 #[derive(Clone, Debug, PartialEq)]
 pub struct InBody {
@@ -72,24 +101,16 @@ impl Written {
             SiteName::Knee => Site::Knee,
             SiteName::Hip => Site::Hip,
         };
-        let [low, high] = site.along_mm();
-        if !(low..=high).contains(&self.along_mm) {
-            return Err(format!(
-                "body.along_mm is {}; it must be from {low} to {high} at the {}",
-                self.along_mm,
-                site.name()
-            ));
-        }
-        for (key, degrees) in
-            [("around_deg", self.around_deg), ("azimuth_deg", self.azimuth_deg), ("turn_deg", self.turn_deg)]
-        {
-            if !(-180.0..=180.0).contains(&degrees) {
-                return Err(format!("body.{key} is {degrees}; it must be from -180 to 180"));
-            }
-        }
+        check_along("body.along_mm", self.along_mm, site)?;
+        check_direction("body.around_deg", self.around_deg)?;
+        check_direction("body.azimuth_deg", self.azimuth_deg)?;
+        check_direction("body.turn_deg", self.turn_deg)?;
         let fat_mm = fat_mm.or(self.fat_mm).unwrap_or(site.usual_fat_mm());
         if !(FAT_MM[0]..=FAT_MM[1]).contains(&fat_mm) {
-            return Err(format!("body.fat_mm is {fat_mm}; it must be from {} to {}", FAT_MM[0], FAT_MM[1]));
+            return Err(format!(
+                "body.fat_mm is {fat_mm} mm; it must be from {} to {} mm",
+                FAT_MM[0], FAT_MM[1]
+            ));
         }
         let place = Place {
             along_mm: self.along_mm,
@@ -103,6 +124,23 @@ impl Written {
         let pieces = line.met(&body, REACH_MM);
         Ok(InBody { site, fat_mm, place, body, line, pieces, names: vec![] })
     }
+}
+
+/// Refuses a distance along the limb that the body does not have; `key` as the user wrote it.
+fn check_along(key: &str, mm: f64, site: Site) -> Result<(), String> {
+    let [low, high] = site.along_mm();
+    if (low..=high).contains(&mm) {
+        return Ok(());
+    }
+    Err(format!("{key} is {mm} mm; it must be from {low} to {high} mm at the {}", site.name()))
+}
+
+/// Refuses a direction that is not from -180 to 180 degrees; `key` as the user wrote it.
+fn check_direction(key: &str, degrees: f64) -> Result<(), String> {
+    if (-180.0..=180.0).contains(&degrees) {
+        return Ok(());
+    }
+    Err(format!("{key} is {degrees} degrees; it must be from -180 to 180 degrees"))
 }
 
 /// The tissue of a file's layer that gives a structure its forces.
@@ -199,24 +237,32 @@ impl InBody {
 }
 
 impl Profile {
-    /// The same patient with other numbers in its file, at its top and in its `[body]`: what the
-    /// line through a body meets follows from them.
-    pub fn with_keys(&self, top: &[(&str, f64)], body: &[(&str, f64)]) -> Result<Self, Error> {
-        let unreadable =
-            |cause: &dyn std::fmt::Display| Error::input(format_args!("{}: {cause}", self.source.origin));
-        let mut table: toml::Table =
-            self.source.text.parse().map_err(|cause: toml::de::Error| unreadable(&cause))?;
-        for (key, value) in top {
-            table.insert((*key).to_owned(), toml::Value::Float(*value));
+    /// The same patient entered as `entry` says: what the line through its body meets follows from
+    /// it.
+    ///
+    /// # Errors
+    ///
+    /// If the patient has no body, a value is out of range, or the needle would not enter.
+    pub fn entered(&self, entry: &Entry) -> Result<Self, Error> {
+        let refuse = |what: &str| Error::input(format_args!("{}: {what}", self.source.origin));
+        let body = self.body.as_ref().ok_or_else(|| {
+            refuse("this patient is layers without a body; choose one with [body], such as forearm")
+        })?;
+        entry.check(body.site).map_err(Error::input)?;
+        let mut table: toml::Table = named_files::parse(&self.source)?;
+        let set = |table: &mut toml::Table, key: &str, value: Option<f64>| {
+            if let Some(value) = value {
+                table.insert(key.to_owned(), toml::Value::Float(value));
+            }
+        };
+        set(&mut table, "entry_deg", entry.angle_deg);
+        if let Some(body) = table.get_mut("body").and_then(toml::Value::as_table_mut) {
+            set(body, "along_mm", entry.along_mm);
+            set(body, "around_deg", entry.around_deg);
+            set(body, "azimuth_deg", entry.azimuth_deg);
+            set(body, "turn_deg", entry.turn_deg);
         }
-        for (key, value) in body {
-            let own = table.get_mut("body").and_then(toml::Value::as_table_mut);
-            let own = own.ok_or_else(|| {
-                unreadable(&"this patient is layers without a body; choose one with [body], such as forearm")
-            })?;
-            own.insert((*key).to_owned(), toml::Value::Float(*value));
-        }
-        let text = toml::to_string(&table).map_err(|cause| unreadable(&cause))?;
+        let text = toml::to_string(&table).map_err(|cause| refuse(&cause.to_string()))?;
         Self::parse_for(Text { origin: self.source.origin.clone(), text }, &self.config.device)
     }
 }
@@ -281,10 +327,13 @@ mod tests {
     #[test]
     fn another_entry_meets_other_structures() {
         let at = |around: f64| {
-            find("shoulder-joint").with_keys(
-                &[("entry_deg", 85.0)],
-                &[("along_mm", 30.0), ("around_deg", around), ("turn_deg", -around)],
-            )
+            find("shoulder-joint").entered(&Entry {
+                angle_deg: Some(85.0),
+                along_mm: Some(30.0),
+                around_deg: Some(around),
+                turn_deg: Some(-around),
+                azimuth_deg: None,
+            })
         };
         let (over, beside) = (at(39.2).expect("it goes in"), at(20.0).expect("it goes in"));
         let has = |profile: &Profile, name: &str| layers(profile).iter().any(|(own, _)| own == name);
@@ -301,11 +350,43 @@ mod tests {
 
     #[test]
     fn a_vein_that_is_missed_leaves_fat_and_muscle() {
-        let beside = find("forearm").with_keys(&[], &[("around_deg", 15.0)]).expect("it goes in");
+        let beside = Entry { around_deg: Some(15.0), ..Entry::default() };
+        let beside = find("forearm").entered(&beside).expect("it goes in");
         let names: Vec<_> = layers(&beside).into_iter().map(|(name, _)| name).collect();
         assert_eq!(names, ["skin", "fat", "muscle"]);
         let over: Vec<_> = layers(&find("forearm")).into_iter().map(|(name, _)| name).collect();
         assert_eq!(over, ["skin", "fat", "vein", "far wall", "muscle"]);
+    }
+
+    #[test]
+    fn a_refused_entry_names_the_option_and_its_unit() {
+        let none = Entry::default();
+        for (entry, wanted) in [
+            (
+                Entry { along_mm: Some(300.0), ..none },
+                "--along is 300 mm; it must be from -60 to 80 mm at the forearm",
+            ),
+            (
+                Entry { around_deg: Some(-181.0), ..none },
+                "--around is -181 degrees; it must be from -180 to 180 degrees",
+            ),
+            (
+                Entry { azimuth_deg: Some(f64::NAN), ..none },
+                "--azimuth is NaN degrees; it must be from -180 to 180 degrees",
+            ),
+            (
+                Entry { turn_deg: Some(300.0), ..none },
+                "--turn is 300 degrees; it must be from -180 to 180 degrees",
+            ),
+            (
+                Entry { angle_deg: Some(3.0), ..none },
+                "--angle is 3 degrees; it must be from 5 to 90 degrees, the angle to the skin",
+            ),
+        ] {
+            assert_eq!(find("forearm").entered(&entry).expect_err(wanted).to_string(), wanted);
+        }
+        let no_body = find("adult").entered(&none).expect_err("it has no body").to_string();
+        assert!(no_body.contains("adult") && no_body.contains("choose one with [body]"), "{no_body}");
     }
 
     #[test]

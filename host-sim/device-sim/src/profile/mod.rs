@@ -22,7 +22,7 @@ use fixed::types::I16F16;
 use serde::Deserialize;
 
 pub use beside::Beside;
-pub use body::InBody;
+pub use body::{Entry, InBody};
 pub use goal::Goal;
 pub use law::Model;
 use person::Thickness;
@@ -169,7 +169,7 @@ impl Profile {
     pub fn at_angle(self, degrees: f64) -> Result<Self, Error> {
         check_angle("--angle", degrees).map_err(Error::input)?;
         if self.body.is_some() {
-            return self.with_keys(&[("entry_deg", degrees)], &[]);
+            return self.entered(&Entry { angle_deg: Some(degrees), ..Entry::default() });
         }
         Ok(Self { entry_rad: degrees.to_radians(), ..self })
     }
@@ -224,7 +224,7 @@ fn check_angle(key: &str, degrees: f64) -> Result<(), String> {
     if (5.0..=90.0).contains(&degrees) {
         Ok(())
     } else {
-        Err(format!("{key} is {degrees}; it must be from 5 to 90, the angle to the skin"))
+        Err(format!("{key} is {degrees} degrees; it must be from 5 to 90 degrees, the angle to the skin"))
     }
 }
 

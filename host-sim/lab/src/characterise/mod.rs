@@ -6,7 +6,7 @@ mod following;
 pub mod mechanism;
 pub mod programme;
 pub mod sequencer;
-pub mod written;
+pub mod writer;
 
 use control_core::Config;
 use device_sim::device::{Port, Wire};
@@ -19,7 +19,7 @@ use recording::messages::Hello;
 use sequencer::Sequencer;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
-use written::Track;
+use writer::Track;
 
 /// The longest single wait for a real device.
 const PATIENCE: Duration = Duration::from_millis(2);

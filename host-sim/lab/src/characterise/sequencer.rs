@@ -5,7 +5,7 @@
 
 use super::following::Following;
 use super::programme::{Programme, Step};
-use super::written::Track;
+use super::writer::Track;
 use control_core::controller::Sample;
 use control_core::event::{Fault, State};
 use control_core::{Config, TICK_HZ};

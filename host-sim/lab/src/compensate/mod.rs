@@ -4,7 +4,7 @@
 pub mod files;
 pub mod page;
 
-pub use device_setup::compensate::{Outcome, Part, Step, Wish, angle, coefficients, felt, weight};
+pub use device_setup::compensate::{Outcome, Part, Step, Wish, angle, coefficients, residual_force, weight};
 
 use crate::commission::bench::Line;
 use device_setup::pause::block_on;

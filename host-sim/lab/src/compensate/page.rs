@@ -1,7 +1,7 @@
 //! Before and after, as a page that needs nothing beside it.
 
 use super::Outcome;
-use super::felt::{Felt, PARTS};
+use super::residual_force::{PARTS, ResidualForce};
 use control_core::compensation::Gain;
 use html_report::chart::{Chart, Curve};
 use html_report::{Cell, Sheet, decimal};
@@ -49,7 +49,7 @@ pub fn html(outcome: &Outcome) -> String {
 }
 
 /// The forces by direction of motion, in mN rms.
-fn ways(before: &Felt, after: &Felt) -> [Vec<Cell>; 4] {
+fn ways(before: &ResidualForce, after: &ResidualForce) -> [Vec<Cell>; 4] {
     let row = |what: &str, before: f64, after: f64| {
         vec![
             Cell::text(what),
@@ -67,7 +67,7 @@ fn ways(before: &Felt, after: &Felt) -> [Vec<Cell>; 4] {
 }
 
 /// The forces along the travel.
-fn by_tenth(before: &Felt, after: &Felt) -> Chart {
+fn by_tenth(before: &ResidualForce, after: &ResidualForce) -> Chart {
     let steps = |values: &[f64; PARTS]| -> Vec<(f64, f64)> {
         let step = |(tenth, force): (usize, &f64)| {
             let (from, to) = (10.0 * tenth as f64, 10.0 * (tenth + 1) as f64);

@@ -3,7 +3,7 @@
 
 use super::subject::Subject;
 use super::{Progress, Settings};
-use crate::compensate::felt::Felt;
+use crate::compensate::residual_force::ResidualForce;
 use crate::compensate::{self, Outcome, Wish, files};
 use device_sim::error::Error;
 use diagnosis::rig::Rig;
@@ -12,9 +12,9 @@ use diagnosis::rig::Rig;
 #[derive(Clone, Debug)]
 pub struct Feel {
     /// With nothing fed forward.
-    pub before: Felt,
+    pub before: ResidualForce,
     /// With what it feeds forward.
-    pub after: Felt,
+    pub after: ResidualForce,
     /// The motion that it took to feed forward and to compare, s.
     pub motion_s: f64,
     /// The parts that were taken back or cannot be fed forward, a sentence each.

@@ -19,7 +19,7 @@ pub use settled::{Round, Settled};
 pub use subject::Subject;
 
 use crate::characterise::programme::{Programme, programmes};
-use crate::characterise::written;
+use crate::characterise::writer;
 use crate::compensate::{self, Wish};
 use device_sim::error::Error;
 use diagnosis::effects::EffectName;
@@ -251,7 +251,7 @@ impl Run<'_> {
             }
         })?;
         shown?;
-        let paths = written::write_all(folder, &tracks)?;
+        let paths = writer::write_all(folder, &tracks)?;
         for path in &paths[1..] {
             let is_holdout = path.file_name().is_some_and(|name| name == "holdout.csv");
             let to = if is_holdout { &mut self.request.holdout } else { &mut self.request.fit };

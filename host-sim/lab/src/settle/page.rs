@@ -2,7 +2,7 @@
 
 use super::name::effect_in_words;
 use super::{Feel, Name, Round, Settled};
-use crate::compensate::felt::Felt;
+use crate::compensate::residual_force::ResidualForce;
 use device_sim::error::Error;
 use html_report::{Cell, Sheet};
 use std::path::Path;
@@ -55,8 +55,8 @@ fn names_json(names: &[Name]) -> Vec<serde_json::Value> {
 }
 
 fn feel_json(feel: &Result<Feel, String>) -> serde_json::Value {
-    let phases = |felt: &Felt| {
-        let phases = felt.phases().map(|(name, force)| (name.to_owned(), serde_json::json!(1e3 * force)));
+    let phases = |residual: &ResidualForce| {
+        let phases = residual.phases().map(|(name, force)| (name.to_owned(), serde_json::json!(1e3 * force)));
         serde_json::Value::Object(phases.into_iter().collect())
     };
     match feel {

@@ -232,7 +232,7 @@ fn together<const N: usize>(signals: [(Signal, f64); N], seconds: f64) -> Input 
 mod tests {
     use super::*;
     use crate::characterise::configuration;
-    use crate::characterise::written::nominal_rig;
+    use crate::characterise::writer::nominal_rig;
     use crate::settle::{Plant, Subject};
 
     fn limited() -> Limited {

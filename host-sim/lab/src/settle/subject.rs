@@ -4,7 +4,7 @@
 use super::Plant;
 use crate::characterise::mechanism::BareDevice;
 use crate::characterise::programme::Programme;
-use crate::characterise::written::{Track, nominal_rig};
+use crate::characterise::writer::{Track, nominal_rig};
 use crate::characterise::{self, News, configuration};
 use crate::commission::bench::{Line, WireLine};
 use crate::commission::mechanism::VirtualLine;

@@ -8,8 +8,8 @@ const LINES: usize = 12;
 /// The signals hold the plant's limits by themselves with this much room for the servo's overshoot.
 const ROOM: f64 = 0.85;
 
-/// Returns the segments of the library for a case; `seed` varies frequencies, ratios and speeds.
-pub(crate) fn library(case: &Case, seed: u64) -> Vec<Segment> {
+/// Returns the segments to choose from for a case; `seed` varies frequencies, ratios and speeds.
+pub(crate) fn candidates(case: &Case, seed: u64) -> Vec<Segment> {
     let limits = case.limits.usable();
     let rig = &case.rivals[0].rig;
     let count = 1.0 / rig.encoder.counts_per_unit.abs();

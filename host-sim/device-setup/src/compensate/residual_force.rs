@@ -18,7 +18,7 @@ pub const PARTS: usize = 10;
 
 /// Force in N, root mean square.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Felt {
+pub struct ResidualForce {
     /// On the way in.
     pub insertion: f64,
     /// Held at rest.
@@ -29,7 +29,7 @@ pub struct Felt {
     pub by_tenth: [f64; PARTS],
 }
 
-impl Felt {
+impl ResidualForce {
     /// The three phases with their names.
     pub fn phases(&self) -> [(&'static str, f64); 3] {
         [("insertion", self.insertion), ("hold", self.hold), ("withdrawal", self.withdrawal)]
@@ -57,11 +57,11 @@ impl Squares {
 }
 
 /// From what was played: the turns and the hold, under `plan`.
-pub fn felt(
+pub fn measure(
     plan: &Plan,
     turns: (&Excitation, &[Sample]),
     hold: (&Excitation, &[Sample]),
-) -> Result<Felt, Error> {
+) -> Result<ResidualForce, Error> {
     let (mut inwards, mut outwards, mut held) = (Squares::default(), Squares::default(), Squares::default());
     let mut tenths = [Squares::default(); PARTS];
     let moves = forces(plan, turns.0, turns.1)?;
@@ -79,7 +79,7 @@ pub fn felt(
         held.add(step.force);
     }
     let by_tenth = tenths.map(Squares::root);
-    Ok(Felt { insertion: inwards.root(), hold: held.root(), withdrawal: outwards.root(), by_tenth })
+    Ok(ResidualForce { insertion: inwards.root(), hold: held.root(), withdrawal: outwards.root(), by_tenth })
 }
 
 struct Step {
