@@ -47,30 +47,58 @@ pub(crate) fn row_s(track: &BlockedRecording) -> f64 {
     hold.iter().sum::<f64>() / hold.len().max(1) as f64
 }
 
-/// Finds the skew of recordings under the nominal model and delays their commands by it. Nothing
-/// changes if the recordings show no skew or more than a row of it, or if it does not explain most
-/// of the residual of the nominal model.
-pub(crate) fn settle(nominal: &mut Nominal, tracks: &mut [BlockedRecording], noise: &Noise, scale: f64) {
-    let without = Fit::new(&Model::default(), nominal, tracks, noise);
-    let mut trial = Nominal { skew_rows: Some(0.0), ..nominal.clone() };
+/// A skew under a model.
+struct Skew {
+    /// Rows by which commands act late.
+    rows: f64,
+    /// The recordings with their commands delayed by it.
+    tracks: Vec<BlockedRecording>,
+    /// The model and a skew, fitted to them.
+    fit: Fit,
+}
+
+/// Finds the skew beside a model by fitting it and shifting the commands in turn; none where it is
+/// more than a row or adds less than [`SEEN`] to the log-likelihood `without` it.
+fn find(
+    model: &Model,
+    nominal: &Nominal,
+    tracks: &[BlockedRecording],
+    noise: &Noise,
+    without: f64,
+) -> Option<Skew> {
+    let mut rows = 0.0;
     let mut shifted = tracks.to_vec();
-    let mut fit = Fit::new(&Model::default(), &trial, &shifted, noise);
-    if fit.log_likelihood - without.log_likelihood < SEEN {
-        return;
+    let fitted = |rows: f64, tracks: &[BlockedRecording]| {
+        Fit::new(model, &Nominal { skew_rows: Some(rows), ..nominal.clone() }, tracks, noise)
+    };
+    let mut fit = fitted(rows, &shifted);
+    if fit.log_likelihood - without < SEEN {
+        return None;
     }
     for _ in 0..ROUNDS {
-        let (Some(skew), Some(gain)) = (fit.value(Key::Skew), fit.value(Key::Gain)) else { return };
-        let (before, step) = (trial.skew_rows.unwrap_or(0.0), skew / gain);
-        if (before + step).abs() > AT_LIMIT * MOST_ROWS {
-            return;
+        let step = fit.value(Key::Skew)? / fit.value(Key::Gain)?;
+        rows += step;
+        if rows.abs() > AT_LIMIT * MOST_ROWS {
+            return None;
         }
-        trial.skew_rows = Some(before + step);
         delay_commands(&mut shifted, step);
-        fit = Fit::new(&Model::default(), &trial, &shifted, noise);
+        fit = fitted(rows, &shifted);
         if step.abs() < FOUND {
             break;
         }
     }
+    Some(Skew { rows, tracks: shifted, fit })
+}
+
+/// True if a skew takes most of the mean square above the noise of the sensor that a model leaves.
+fn takes_most(
+    skew: &Skew,
+    without: &Fit,
+    nominal: &Nominal,
+    tracks: &[BlockedRecording],
+    noise: &Noise,
+    scale: f64,
+) -> bool {
     let estimator = Estimator::new(tracks, noise, scale);
     let count = 1.0 / nominal.rig.encoder.counts_per_unit;
     let left = |fit: &Fit, tracks: &[BlockedRecording]| {
@@ -79,8 +107,47 @@ pub(crate) fn settle(nominal: &mut Nominal, tracks: &mut [BlockedRecording], noi
             tracks.iter().zip(&totals).map(|(track, total)| estimator.residual(track, total)).collect();
         estimator.rms(&residuals, tracks).powi(2) - estimator.counting(tracks, noise, count).powi(2)
     };
-    if left(&fit, &shifted) < MOST_LEFT * left(&without, tracks) {
-        tracks.clone_from_slice(&shifted);
-        nominal.skew_rows = trial.skew_rows;
+    left(&skew.fit, &skew.tracks) < MOST_LEFT * left(without, tracks)
+}
+
+/// Finds the skew of recordings under the nominal model and delays their commands by it. Nothing
+/// changes if the recordings show no skew or more than a row of it, or if it does not explain most
+/// of the residual of the nominal model.
+pub(crate) fn settle(nominal: &mut Nominal, tracks: &mut [BlockedRecording], noise: &Noise, scale: f64) {
+    let model = Model::default();
+    let without = Fit::new(&model, nominal, tracks, noise);
+    let Some(skew) = find(&model, nominal, tracks, noise, without.log_likelihood) else { return };
+    if takes_most(&skew, &without, nominal, tracks, noise, scale) {
+        tracks.clone_from_slice(&skew.tracks);
+        nominal.skew_rows = Some(skew.rows);
     }
+}
+
+/// Returns the skew, in rows, that an effect of a model stands for, or that takes most of what the
+/// model leaves: missing effects may hide a skew until they are in the model. None where the
+/// nominal model allows for a skew already.
+pub(crate) fn beside(
+    model: &Model,
+    nominal: &Nominal,
+    tracks: &[BlockedRecording],
+    noise: &Noise,
+    scale: f64,
+) -> Option<f64> {
+    if nominal.skew_rows.is_some() || model.effects.is_empty() {
+        return None;
+    }
+    let whole = Fit::new(model, nominal, tracks, noise);
+    let replaces = |effect: usize| {
+        let mut less = model.clone();
+        less.effects.remove(effect);
+        let skew = find(&less, nominal, tracks, noise, f64::NEG_INFINITY)?;
+        (skew.fit.log_likelihood >= whole.log_likelihood).then_some(skew)
+    };
+    let better = |a: &Skew, b: &Skew| a.fit.log_likelihood.total_cmp(&b.fit.log_likelihood);
+    let replacing = (0..model.effects.len()).filter_map(replaces).max_by(better);
+    let skew = replacing.or_else(|| {
+        let skew = find(model, nominal, tracks, noise, whole.log_likelihood)?;
+        takes_most(&skew, &whole, nominal, tracks, noise, scale).then_some(skew)
+    })?;
+    Some(skew.rows)
 }

@@ -18,11 +18,12 @@ mod run_forward;
 mod search;
 mod verdict;
 
-use crate::estimation::plausibility;
+use crate::estimation::{plausibility, skew};
 use crate::io::error::InputError;
 use crate::io::recording::Recording;
 use crate::io::rig::Rig;
 use crate::io::sufficiency;
+use crate::selection::context::FittedModel;
 use assess::Assessment;
 use by_plain::{by_plain, by_plain_alone};
 use by_shares::{ByShares, by_shares, confirmed};
@@ -48,8 +49,12 @@ pub(crate) fn run(
         let reason = Reason::Recordings(sentence);
         return Ok(Diagnosis::CannotTell { rig: Box::new(rig.clone()), reason, rate_hz: None });
     }
-    let prepared = prepare::prepare(rig, fit, holdout, progress);
-    let found = search::search(&prepared, progress);
+    let mut prepared = prepare::prepare(rig, fit, holdout, None, progress);
+    let mut found = search::search(&prepared, progress);
+    if let Some(rows) = skew_beside(&prepared, &found) {
+        prepared = prepare::prepare(rig, fit, holdout, Some(rows), progress);
+        found = search::search(&prepared, progress);
+    }
     progress("comparing shares of the force", 0.9);
     let assessed = assessed(&prepared, found);
     progress("writing down", 0.95);
@@ -58,6 +63,16 @@ pub(crate) fn run(
         Ok(assessment) => decide::decide(&prepared, &assessment, holdout, rate_hz),
         Err(reason) => Diagnosis::CannotTell { rig: Box::new(prepared.nominal.rig.clone()), reason, rate_hz },
     })
+}
+
+/// The skew between command and reading, in rows, that only shows beside the effects that were
+/// found or that one of them stands for.
+fn skew_beside(prepared: &Prepared, found: &Found) -> Option<f64> {
+    if prepared.nominal.virtual_inertia > 0.0 {
+        return None;
+    }
+    let FittedModel { model, noise, .. } = &found.standing.model;
+    skew::beside(model, &prepared.nominal, &found.fit, noise, prepared.scale)
 }
 
 /// Assesses what was found; where nothing is named, what a plain selection found.

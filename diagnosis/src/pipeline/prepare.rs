@@ -46,21 +46,31 @@ impl Prepared {
     }
 }
 
-/// Cuts recordings into blocks, refits the nominal model, and looks for lost counts.
-pub(crate) fn prepare(rig: &Rig, fit: &[Recording], holdout: &[Recording], progress: Progress) -> Prepared {
-    let plain = PlainSelection::new(rig, fit, holdout);
+/// Cuts recordings into blocks, refits the nominal model, and looks for lost counts; `skew_rows`
+/// are the rows by which commands act late, where that is known.
+pub(crate) fn prepare(
+    rig: &Rig,
+    fit: &[Recording],
+    holdout: &[Recording],
+    skew_rows: Option<f64>,
+    progress: Progress,
+) -> Prepared {
     let cut = |all: &[Recording]| all.iter().map(|r| BlockedRecording::moving(r, rig)).collect::<Vec<_>>();
-    let (mut tracks, mut holdout) = (cut(fit), cut(holdout));
+    let (mut tracks, mut judging) = (cut(fit), cut(holdout));
     let mut nominal = Nominal::of(rig);
-    quasi_static::add_inertia(&mut nominal, &mut tracks, &mut holdout);
+    quasi_static::add_inertia(&mut nominal, &mut tracks, &mut judging);
     progress("refitting the nominal model", 0.1);
     let (mut noise, mut refit) = refit::settle(&mut nominal, &mut tracks);
-    if nominal.virtual_inertia == 0.0 {
+    if let Some(rows) = skew_rows {
+        skew::delay_commands(&mut tracks, rows);
+        nominal.skew_rows = skew_rows;
+    } else if nominal.virtual_inertia == 0.0 {
         let scale = refit::acceleration_scale(&nominal, &tracks);
         skew::settle(&mut nominal, &mut tracks, &noise, scale);
     }
+    let plain = PlainSelection::new(rig, nominal.skew_rows.unwrap_or(0.0), [fit, holdout]);
     if let Some(rows) = nominal.skew_rows {
-        skew::delay_commands(&mut holdout, rows);
+        skew::delay_commands(&mut judging, rows);
         (noise, refit) = refit::settle(&mut nominal, &mut tracks);
     }
     let scale = refit::acceleration_scale(&nominal, &tracks);
@@ -71,7 +81,7 @@ pub(crate) fn prepare(rig: &Rig, fit: &[Recording], holdout: &[Recording], progr
     let asked = if spread.is_some() { Asked::KNOWN } else { Asked::UNKNOWN };
     let first = Fit::new(&Model::default(), &nominal, &tracks, &noise);
     let first = FittedModel { model: Model::default(), noise, fit: first, merit: 0.0 };
-    let mut holdout = HoldoutSet::new(holdout);
+    let mut holdout = HoldoutSet::new(judging);
     holdout.follow(&first, &nominal, &span, scale);
     search.find(&mut holdout.filtered, asked, spread);
     holdout.share_jumps();

@@ -95,8 +95,9 @@ fn fast(speed: &[f64]) -> f64 {
 }
 
 impl Axis {
-    /// None where the recording has too few rows to be differentiated.
-    pub(super) fn new(recording: &Recording, rig: &Rig) -> Option<Self> {
+    /// None where the recording has too few rows to be differentiated. Commands act `late_rows` of
+    /// its rows after their time stamps.
+    pub(super) fn new(recording: &Recording, rig: &Rig, late_rows: f64) -> Option<Self> {
         let rows = Rows::of(recording, rig);
         let n = rows.stamps.len();
         let seconds = *rows.stamps.last()?;
@@ -112,7 +113,8 @@ impl Axis {
         let slow = REST * fast(&speed);
         let rest: Vec<bool> = speed.iter().map(|v| v.abs() <= slow).collect();
         let at_rest = |(d, rest): (&f64, &bool)| if *rest { 0.0 } else { *d };
-        let known = rig.actuator.delay_s.unwrap_or(0.0) + rig.actuator.lag_s.unwrap_or(0.0);
+        let skew_s = late_rows * seconds / (recording.time_s.len() - 1) as f64;
+        let known = rig.actuator.delay_s.unwrap_or(0.0) + rig.actuator.lag_s.unwrap_or(0.0) + skew_s;
         let late: Vec<f64> = rows.stamps.iter().map(|t| t + known).collect();
         let drive = cells(&late, &rows.command, &grid, h).iter().map(|u| rig.actuator.gain * u).collect();
         let motion = PlainMotion {

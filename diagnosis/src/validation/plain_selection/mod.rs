@@ -44,11 +44,11 @@ pub(crate) struct PlainSelection {
 
 impl PlainSelection {
     /// Selects laws; nothing where the rig has effects of its own, of which it knows nothing, or a
-    /// recording has too few rows that move.
-    pub(crate) fn new(rig: &Rig, fit: &[Recording], holdout: &[Recording]) -> Self {
+    /// recording has too few rows that move. Commands act `late_rows` rows after their time stamps.
+    pub(crate) fn new(rig: &Rig, late_rows: f64, [fit, holdout]: [&[Recording]; 2]) -> Self {
         let all: Vec<&Recording> = fit.iter().chain(holdout).collect();
         let axes: Option<Vec<Axis>> =
-            parallel::map_all(&all, |one| Axis::new(one, rig)).into_iter().collect();
+            parallel::map_all(&all, |one| Axis::new(one, rig, late_rows)).into_iter().collect();
         let enough = |axes: &Vec<Axis>| axes.iter().all(|axis| axis.rows() >= FEWEST_ROWS);
         match axes.filter(enough) {
             Some(axes) if rig.effects.is_empty() => Selecting { axes, fits: fit.len() }.select(rig),
@@ -248,7 +248,7 @@ mod tests {
     }
 
     fn names(fit: &[Recording], holdout: &[Recording]) -> Vec<N> {
-        let selection = PlainSelection::new(&rig(), fit, holdout);
+        let selection = PlainSelection::new(&rig(), 0.0, [fit, holdout]);
         assert!(selection.knows(&[N::QuadraticDrag, N::CommandDelay]) && !selection.knows(&[N::Backlash]));
         selection.found.iter().filter(|one| one.share >= 0.15).map(|one| one.name).collect()
     }
@@ -270,7 +270,7 @@ mod tests {
     #[test]
     fn a_constant_force_is_neither_found_nor_denied() {
         let constant = [1, 2].map(|seed| recording(seed, 8000, |_, _| 1.5));
-        let selection = PlainSelection::new(&rig(), &constant[..1], &constant[1..]);
+        let selection = PlainSelection::new(&rig(), 0.0, [&constant[..1], &constant[1..]]);
         assert!(!selection.has_one_of(&[N::AsymmetricFriction]), "{:?}", selection.found);
         assert!(!selection.knows(&[N::AsymmetricFriction]));
     }
@@ -280,7 +280,7 @@ mod tests {
         let extra = |_: f64, v: f64| -0.1 * v * v.abs();
         let fine = [1, 2].map(|seed| recording(seed, 32_000, extra));
         assert_eq!(names(&fine[..1], &fine[1..]), [N::QuadraticDrag]);
-        let rows = |rows| Axis::new(&recording(1, rows, extra), &rig()).expect("it moves").rows();
+        let rows = |rows| Axis::new(&recording(1, rows, extra), &rig(), 0.0).expect("it moves").rows();
         assert!(rows(32_000) < 3 * rows(8_000), "{} rows", rows(32_000));
     }
 }
