@@ -244,7 +244,7 @@ pub(crate) fn confirmed(mut found: Found, materials: Vec<Material>) -> Found {
 
 /// The limit to how well recordings are explained.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Regime {
+pub(super) enum Regime {
     /// Noise, before anything was found.
     Noise,
     /// Noise, beside what was found.
@@ -254,7 +254,7 @@ enum Regime {
 }
 
 impl Regime {
-    fn of(prepared: &Prepared, found: &Found) -> Self {
+    pub(super) fn of(prepared: &Prepared, found: &Found) -> Self {
         let left = |model: &FittedModel| discrepancy(prepared, found, model, &model.noise);
         if left(&found.null) < LEAVES_SOMETHING {
             Self::Noise

@@ -1,7 +1,7 @@
 //! The stages of a diagnosis, one after another: this folder alone sequences them.
 //!
 //! [`prepare`] cuts rig and recordings into blocks and refits the nominal model; [`search`] adds
-//! and removes effects; [`by_shares`] selects them by shares of the force error where other physics
+//! and removes effects, [`reshaped_command`] those that only shrink the command; [`by_shares`] selects them by shares of the force error where other physics
 //! and not noise limits; [`assess`] weighs those that stand; [`decide`] names them, or says why
 //! nothing is named. Each stage is one function that takes what the one before it returns, and
 //! changes none of it. What comes out is a [`diagnosis::Diagnosis`].
@@ -14,6 +14,7 @@ mod decide;
 pub(crate) mod diagnosis;
 mod patched_rig;
 mod prepare;
+mod reshaped_command;
 mod run_forward;
 mod search;
 mod verdict;
@@ -29,6 +30,7 @@ use by_plain::{by_plain, by_plain_alone};
 use by_shares::{ByShares, by_shares, confirmed};
 use diagnosis::{Diagnosis, Reason};
 use prepare::Prepared;
+use reshaped_command::without_wrong_sizes;
 use search::Found;
 
 /// A callback that receives the stage and the fraction done.
@@ -50,11 +52,12 @@ pub(crate) fn run(
         return Ok(Diagnosis::CannotTell { rig: Box::new(rig.clone()), reason, rate_hz: None });
     }
     let mut prepared = prepare::prepare(rig, fit, holdout, None, progress);
-    let mut found = search::search(&prepared, progress);
+    let mut found = search::search(&prepared, Vec::new(), progress);
     if let Some(rows) = skew_beside(&prepared, &found) {
         prepared = prepare::prepare(rig, fit, holdout, Some(rows), progress);
-        found = search::search(&prepared, progress);
+        found = search::search(&prepared, Vec::new(), progress);
     }
+    let found = without_wrong_sizes(&prepared, found, progress);
     progress("comparing shares of the force", 0.9);
     let assessed = assessed(&prepared, found);
     progress("writing down", 0.95);

@@ -2,7 +2,7 @@
 //! the headline. Nothing reads one to decide.
 
 use crate::numerics::bootstrap::Gain;
-use crate::numerics::digits::short;
+use crate::numerics::digits::{in_sentence, short};
 use crate::pipeline::diagnosis::Reason;
 use crate::selection::untested::NotTested;
 use crate::thresholds::{CERTAIN_Z, LEAST_SHARE, MATERIAL, SURE_Z, UNLIKELY_Z, UNSURE_SHARE};
@@ -60,6 +60,11 @@ pub(crate) fn rejection(why: &Rejection) -> String {
         }
         Rejection::Undecided => "more effects explain it as well than a class may hold".into(),
         Rejection::NotInPlain { found } => format!("a plain regression finds {found} and not this"),
+        Rejection::TakesOtherForce { on_fit, on_holdout } => format!(
+            "the motion misses {} and {} times the force that it takes from the command, on fitted and held-out recordings",
+            in_sentence(*on_fit),
+            in_sentence(*on_holdout)
+        ),
         Rejection::Improbable { probability, weakness: weakest } => {
             format!("it is right with a probability of only {probability:.2}: {}", weakness(weakest))
         }

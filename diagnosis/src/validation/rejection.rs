@@ -51,6 +51,9 @@ pub(crate) enum Rejection {
     Undecided,
     /// A plain regression of the force finds another effect, which is named, and not this one.
     NotInPlain { found: EffectName },
+    /// The force that it takes from the recorded command is these times what the motion misses, on
+    /// fitted and on held-out recordings.
+    TakesOtherForce { on_fit: f64, on_holdout: f64 },
     /// The probability that it is right is too small.
     Improbable { probability: f64, weakness: Weakness },
     /// The recordings cannot tell it from a named effect.

@@ -4,6 +4,7 @@ use super::sight::{Scale, Sight};
 use crate::effects::definition::FREE;
 use crate::effects::{CommandLaw, Effect};
 use crate::estimation::blocked_recording::BlockedRecording;
+use crate::estimation::effective_command::effective_command;
 use crate::estimation::input::Input;
 use crate::estimation::nominal::Nominal;
 use crate::estimation::regressors::effect_inputs;
@@ -93,6 +94,26 @@ pub(crate) fn columns(
     }
     let bounds = (0..terms).map(|term| bounds(effect, term, nominal, scale)).collect();
     Some(Columns { effect: effect.clone(), of, own: definition.has_own_phase(), bounds, sd: f64::INFINITY })
+}
+
+/// The column of a law of the command: the force that it takes from the recorded one. Its
+/// coefficient is one where the law is right; none for an effect that is no such law.
+pub(super) fn taken_from_command(effect: &Effect, sights: &[Sight], nominal: &Nominal) -> Option<Columns> {
+    let gain = Scale::of(nominal).gain;
+    let column = |sight: &Sight| {
+        let effective = effective_command(sight.track, std::slice::from_ref(effect))?;
+        let mut mapped = BlockedRecording::clone(sight.track);
+        mapped.set_command(effective);
+        let of = |track: &BlockedRecording| sight.blocks_of(&track.rows.command_input);
+        let taken = of(sight.track)
+            .iter()
+            .zip(of(&mapped))
+            .map(|(u, passed)| gain * (u - passed))
+            .collect::<Vec<f64>>();
+        Some(vec![sight.see(&taken)])
+    };
+    let of = sights.iter().map(column).collect::<Option<Vec<_>>>()?;
+    Some(Columns { effect: effect.clone(), of, own: false, bounds: vec![FREE], sd: f64::INFINITY })
 }
 
 /// Bounds of a term, as a force. A law that may have either sign is not held to what the rig says

@@ -1,7 +1,7 @@
 //! Forward selection of effects by their shares of the force error.
 
 use super::forms::forms;
-use super::laws::{Columns, columns};
+use super::laws::{Columns, columns, taken_from_command};
 use super::share::Share;
 pub(crate) use super::state::Selection;
 use super::state::State;
@@ -208,6 +208,18 @@ impl Selection<'_> {
             others.iter().filter_map(|other| columns(other, &self.sights, nominal, &first.asked)).collect();
         let state = State::new(self, laws.iter().collect());
         state.share(&columns(effect, &self.sights, nominal, &state.asked)?)
+    }
+
+    /// The force that the motion misses over the force that a law of the command takes from the
+    /// recorded one, on fitted and on held-out recordings, beside other effects; none for an effect
+    /// that is no such law.
+    pub(crate) fn size_of_map(&self, effect: &Effect, others: &[&Effect]) -> Option<(f64, f64)> {
+        let nominal = self.context.nominal;
+        let first = State::new(self, Vec::new());
+        let laws: Vec<Columns> =
+            others.iter().filter_map(|other| columns(other, &self.sights, nominal, &first.asked)).collect();
+        let state = State::new(self, laws.iter().collect());
+        Some(state.sizes(&taken_from_command(effect, &self.sights, nominal)?))
     }
 
     /// The share of law `i` beside the others, with its rivals.

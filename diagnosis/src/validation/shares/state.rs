@@ -113,6 +113,15 @@ impl<'a> State<'a> {
         (share.on_fit.is_finite() && share.on_holdout.is_finite()).then_some(share)
     }
 
+    /// The coefficients of a law of one term on fitted and on held-out recordings.
+    pub(super) fn sizes(&self, law: &Columns) -> (f64, f64) {
+        let mut laws = self.laws.clone();
+        laws.push(law);
+        let (fitted, there) = self.on.designs(&laws);
+        let size = |design: &Design| design.solve(self.square, |_| true)[design.laws[laws.len() - 1][0][0]];
+        (size(&fitted), size(&there))
+    }
+
     /// The best shape of every effect that may be added, the one with the largest share first.
     pub(super) fn ranked(&self, wanted: &(dyn Fn(N) -> bool + Sync)) -> Vec<(Share, Columns)> {
         let context = self.on.context;
