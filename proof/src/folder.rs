@@ -59,25 +59,33 @@ fn case(id: &str, path: &Path, keys: &BTreeMap<String, Truth>) -> Result<Brought
     Ok(Brought { id: id.into(), paths: paths(path)?, truth })
 }
 
-/// The files of the case in a folder.
+/// The files of the case in a folder. Where no recording is named `fit*` or `holdout*`, the last in
+/// the order of their names judges and the others are fitted.
 ///
 /// # Errors
 /// One sentence: what is missing or cannot be read.
 pub(crate) fn paths(path: &Path) -> Result<Paths, String> {
-    let (mut fit, mut holdout) = (Vec::new(), Vec::new());
+    let (mut fit, mut holdout, mut others) = (Vec::new(), Vec::new(), Vec::new());
     let entries = std::fs::read_dir(path).map_err(|e| format!("cannot read {}: {e}", path.display()))?;
     for entry in entries.flatten() {
         let name = entry.file_name().to_string_lossy().into_owned();
         match name.ends_with(".csv") {
             true if name.starts_with("fit") => fit.push(entry.path()),
             true if name.starts_with("holdout") => holdout.push(entry.path()),
-            _ => {}
+            true => others.push(entry.path()),
+            false => {}
         }
     }
-    fit.sort();
-    holdout.sort();
+    [&mut fit, &mut holdout, &mut others].into_iter().for_each(|list| list.sort());
+    if fit.is_empty() && holdout.is_empty() && others.len() > 1 {
+        holdout.extend(others.pop());
+        fit = others;
+    }
     if fit.is_empty() || holdout.is_empty() {
-        return Err(format!("{} needs fit*.csv and holdout*.csv, at least one of each", path.display()));
+        return Err(format!(
+            "{} needs fit*.csv and holdout*.csv, at least one of each, or two recordings of other names",
+            path.display()
+        ));
     }
     Ok(Paths { rig: path.join("rig.toml"), fit, holdout })
 }
@@ -131,8 +139,23 @@ mod tests {
         }
         let found = find(&top).unwrap();
         assert_eq!((found.len(), found[0].paths.fit.len(), found[0].paths.holdout.len()), (1, 2, 1));
+        ["fit.csv", "fit2.csv"].iter().for_each(|name| std::fs::remove_file(case.join(name)).unwrap());
+        says("needs fit*.csv");
         std::fs::write(top.join("key.json"), r#"{"cases": {"b": {"kind": "null"}}}"#).unwrap();
         says("`b`");
+        std::fs::remove_dir_all(&top).unwrap();
+    }
+
+    #[test]
+    fn of_recordings_of_other_names_the_last_judges() {
+        let top = std::env::temp_dir().join(format!("proof-names-{}", std::process::id()));
+        std::fs::create_dir_all(&top).unwrap();
+        for name in ["train.csv", "pulses.csv", "slow.csv", "rig.toml"] {
+            std::fs::write(top.join(name), "").unwrap();
+        }
+        let Paths { fit, holdout, .. } = paths(&top).unwrap();
+        assert_eq!(fit, [top.join("pulses.csv"), top.join("slow.csv")]);
+        assert_eq!(holdout, [top.join("train.csv")]);
         std::fs::remove_dir_all(&top).unwrap();
     }
 }

@@ -121,7 +121,8 @@ pub const HELP: &str = "prove: the blinded benchmark of the diagnosis
   --cases-from DIR  judge the cases of a folder with its key.json or believed.tsv and draw none; again for more folders.
                     docs/benchmark.md tells the format
   --inject DIR  conceal known effects in the recordings of real machines of a folder (a folder a machine, with rig.toml,
-                fit*.csv and holdout*.csv) and judge these; again for more folders. --cases K: K effects in all (44)
+                fit*.csv and holdout*.csv; of other names the last judges) and judge these; again for more folders.
+                --cases K: K effects in all (44)
   --untouched DIR  with --inject: the diagnoses of the machines as they are, in a folder for every machine, whatever version
                 made them, so that two versions meet the same cases. Without it they are made anew for each version and
                 kept in inject-untouched of the folder of --out

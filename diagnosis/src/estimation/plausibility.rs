@@ -2,10 +2,11 @@
 //! is searched: each gets the sentence that helps, and none may end in a name.
 
 use crate::io::recording::Recording;
-use crate::io::rig::Rig;
+use crate::io::rig::{Kind, Rig};
 use crate::numerics::linear::{Factor, Square};
 use crate::numerics::spread::spread;
 use crate::simulation::Motion;
+use std::f64::consts::{PI, TAU};
 
 /// Readings of an encoder are whole counts: where more than this part is not, and fewer counts than
 /// this are travelled, they are something else.
@@ -119,6 +120,38 @@ impl Smoothed {
         (all > 0.0 && by_acceleration > 0.3 * all).then(|| (factors[0], 1.0 - left / all))
     }
 
+    /// The inertia for which the motion asks if its angle is `unit` times as large, with friction,
+    /// gravity and a constant beside; none where that explains too little.
+    fn inertia_in(&self, unit: f64) -> Option<f64> {
+        let force = &self.force;
+        let scaled = |column: &[f64]| column.iter().map(|x| unit * x).collect::<Vec<f64>>();
+        let angle = scaled(&self.position);
+        let of_angle = |f: fn(f64) -> f64| angle.iter().map(|x| f(*x)).collect::<Vec<f64>>();
+        let mut columns = vec![
+            scaled(&self.acceleration),
+            scaled(&self.velocity),
+            self.direction.clone(),
+            vec![1.0; force.len()],
+        ];
+        match spread(&angle) > FAR_FOR_GRAVITY {
+            true => columns.extend([of_angle(f64::sin), of_angle(f64::cos)]),
+            false => columns.push(angle),
+        }
+        let columns: Vec<&Vec<f64>> = columns.iter().collect();
+        let factors = least_squares(&columns, force)?;
+        let variance = |column: &[f64]| {
+            let mean = column.iter().sum::<f64>() / column.len() as f64;
+            column.iter().map(|x| (x - mean).powi(2)).sum::<f64>()
+        };
+        let of = |row: usize| columns.iter().zip(&factors).map(|(column, x)| column[row] * x).sum::<f64>();
+        let left: Vec<f64> = force.iter().enumerate().map(|(row, f)| f - of(row)).collect();
+        let all = variance(force);
+        let by_acceleration = factors[0] * factors[0] * variance(columns[0]);
+        let is_enough =
+            all > 0.0 && by_acceleration > BY_ACCELERATION * all && variance(&left) < (1.0 - EXPLAINED) * all;
+        is_enough.then_some(factors[0])
+    }
+
     /// True if the axis gives energy to its drive and would gain it by friction: a spring gives
     /// back what it stored.
     fn gains_by_friction(&self) -> bool {
@@ -177,6 +210,67 @@ fn scale_or_sign(recording: &Recording, rig: &Rig) -> Option<String> {
         ));
     }
     None
+}
+
+/// Part of the force's variance that acceleration has to explain for a mistake that every recording
+/// shows.
+const BY_ACCELERATION: f64 = 0.03;
+/// Travel, rad, beyond which gravity is a force over the angle and not over the travel.
+const FAR_FOR_GRAVITY: f64 = 0.5;
+/// A unit in which counts are given instead of radians.
+struct UnitOfAngle {
+    /// Radians in it.
+    radians: f64,
+    /// The factor around the rig's inertia within which every recording asks for it in the right
+    /// unit: rigs err by more than people who convert turns.
+    right: f64,
+    mistake: &'static str,
+}
+
+const UNITS_OF_ANGLE: [UnitOfAngle; 4] = [
+    UnitOfAngle {
+        radians: PI / 180.0,
+        right: 2.2,
+        mistake: "counts_per_unit seems to be per degree; multiply it by 57.2958",
+    },
+    UnitOfAngle {
+        radians: 180.0 / PI,
+        right: 2.2,
+        mistake: "counts_per_unit seems to be 57.3 times too large, as where degrees were converted twice; divide it by 57.2958",
+    },
+    UnitOfAngle {
+        radians: TAU,
+        right: 1.4,
+        mistake: "counts_per_unit seems to be per turn; divide it by 6.28319",
+    },
+    UnitOfAngle {
+        radians: 1.0 / TAU,
+        right: 1.4,
+        mistake: "counts_per_unit seems to be 6.28 times too small, as where turns were converted twice; multiply it by 6.28319",
+    },
+];
+
+/// The mistake in the unit of angle that all recordings share: with the angle in another unit each
+/// of them asks for the rig's inertia, and as it is for far more or less than the rig's uncertainty
+/// allows.
+pub(crate) fn unit_of_angle(all: &[&Recording], rig: &Rig) -> Option<String> {
+    let knows_inertia = 3.0 * (rig.inertia_sd() + rig.gain_sd()) < TAU.ln();
+    if rig.kind != Kind::Rotary
+        || !knows_inertia
+        || !rig.effects.is_empty()
+        || all.iter().any(|one| one.force.is_some())
+    {
+        return None;
+    }
+    let smoothed: Vec<Smoothed> = all.iter().map(|recording| Smoothed::new(recording, rig)).collect();
+    let asks_for_it = |unit: &UnitOfAngle| {
+        smoothed.iter().all(|one| {
+            let ratio = one.inertia_in(unit.radians).map(|inertia| inertia / rig.model.inertia);
+            ratio.is_some_and(|ratio| (1.0 / unit.right..unit.right).contains(&ratio))
+        })
+    };
+    let unit = UNITS_OF_ANGLE.iter().find(|unit| asks_for_it(unit))?;
+    Some(format!("the motion of every recording asks for an inertia far from the rig's: {}", unit.mistake))
 }
 
 /// Factor between the inertia for which one recording asks and that of the others from which they
@@ -264,5 +358,29 @@ mod tests {
         turned.command.iter_mut().for_each(|u| *u = -*u);
         let sentence = mistake(&turned, &rig).expect("its sign is wrong");
         assert!(sentence.contains("a sign is wrong"), "{sentence}");
+    }
+
+    #[test]
+    fn an_angle_in_degrees_or_turns_is_a_wrong_unit() {
+        let right = Rig::parse(RIG, "rig.toml").expect("the rig is right");
+        let all = [swing(0.0), swing(0.0)];
+        let all: Vec<&Recording> = all.iter().collect();
+        assert_eq!(unit_of_angle(&all, &right), None);
+        for (factor, wanted) in [
+            (PI / 180.0, "multiply it by 57.2958"),
+            (180.0 / PI, "divide it by 57.2958"),
+            (TAU, "divide it by 6.28319"),
+            (1.0 / TAU, "multiply it by 6.28319"),
+        ] {
+            let mut rig = right.clone();
+            rig.encoder.counts_per_unit *= factor;
+            let sentence = unit_of_angle(&all, &rig).expect(wanted);
+            assert!(sentence.contains(wanted), "{sentence}");
+            rig.uncertainty.inertia = Some(3.0);
+            assert_eq!(unit_of_angle(&all, &rig), None, "nobody knows the inertia");
+        }
+        let mut heavier = right.clone();
+        heavier.model.inertia *= 3.0;
+        assert_eq!(unit_of_angle(&all, &heavier), None, "a wrong value is not a wrong unit");
     }
 }

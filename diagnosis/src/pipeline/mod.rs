@@ -146,5 +146,8 @@ fn unusable(all: &[&Recording], rig: &Rig) -> Option<String> {
         usable.remove(place);
         Some(sentence)
     };
-    first.or_else(odd).map(|sentence| sufficiency::with_usable(sentence, &usable))
+    first
+        .or_else(|| plausibility::unit_of_angle(all, rig))
+        .or_else(odd)
+        .map(|sentence| sufficiency::with_usable(sentence, &usable))
 }
