@@ -1,7 +1,8 @@
 //! The stages of a diagnosis, one after another: this folder alone sequences them.
 //!
 //! [`prepare`] cuts rig and recordings into blocks and refits the nominal model; [`search`] adds
-//! and removes effects, [`reshaped_command`] those that only shrink the command; [`by_shares`] selects them by shares of the force error where other physics
+//! and removes effects, [`reshaped_command`] those that only shrink the command;
+//! [`by_shares`] selects them by shares of the force error where other physics
 //! and not noise limits; [`assess`] weighs those that stand; [`decide`] names them, or says why
 //! nothing is named. Each stage is one function that takes what the one before it returns, and
 //! changes none of it. What comes out is a [`diagnosis::Diagnosis`].

@@ -18,7 +18,7 @@ use crate::validation::shares::select::Selection;
 /// Most searches that leave a law out; each leaves out one more at least.
 const ROUNDS: usize = 2;
 
-/// What is found without the laws of the command whose force is not the one that the motion misses.
+/// Returns what is found without the laws of the command whose force is not the missing one.
 pub(super) fn without_wrong_sizes(prepared: &Prepared, mut found: Found, progress: Progress) -> Found {
     let mut excluded = Vec::new();
     for _ in 0..ROUNDS {
@@ -55,7 +55,7 @@ fn wrong_sizes(prepared: &Prepared, found: &Found) -> Vec<RejectedHypothesis> {
         let one = &effects[place];
         let (on_fit, on_holdout) = selection.size_of_map(&one.effect, &others)?;
         let is_wrong = [on_fit, on_holdout].iter().any(|size| !(AS_IT_IS.0..=AS_IT_IS.1).contains(size));
-        is_wrong.then(|| RejectedHypothesis {
+        is_wrong.then_some(RejectedHypothesis {
             name: one.effect.name,
             holdout_gain: Some(one.holdout.sum),
             why: Rejection::TakesOtherForce { on_fit, on_holdout },

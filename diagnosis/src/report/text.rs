@@ -60,11 +60,7 @@ pub(crate) fn rejection(why: &Rejection) -> String {
         }
         Rejection::Undecided => "more effects explain it as well than a class may hold".into(),
         Rejection::NotInPlain { found } => format!("a plain regression finds {found} and not this"),
-        Rejection::TakesOtherForce { on_fit, on_holdout } => format!(
-            "the motion misses {} and {} times the force that it takes from the command, on fitted and held-out recordings",
-            in_sentence(*on_fit),
-            in_sentence(*on_holdout)
-        ),
+        Rejection::TakesOtherForce { on_fit, on_holdout } => other_force(*on_fit, *on_holdout),
         Rejection::Improbable { probability, weakness: weakest } => {
             format!("it is right with a probability of only {probability:.2}: {}", weakness(weakest))
         }
@@ -72,6 +68,14 @@ pub(crate) fn rejection(why: &Rejection) -> String {
         Rejection::LessInSearch => "not fitted in full: other effects explained more in the search".into(),
         Rejection::Behind { winner, z } => format!("{winner} explains more by {z:.1} standard errors"),
     }
+}
+
+fn other_force(on_fit: f64, on_holdout: f64) -> String {
+    format!(
+        "the motion misses {} and {} times the force that it takes from the command, on fitted and held-out recordings",
+        in_sentence(on_fit),
+        in_sentence(on_holdout)
+    )
 }
 
 fn not_sure(fit_z: f64, holdout_z: f64, share: f64) -> String {
