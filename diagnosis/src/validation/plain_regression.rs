@@ -205,3 +205,91 @@ fn gain(left: &Left, columns: &Columns, theta: &[f64], estimator: &Estimator) ->
     let gain = relative_gain(estimator, left.tracks, &before, &after);
     (gain.sum >= PREDICTS && gain.low > 0.0 && gain.z >= SURE_Z).then_some(gain.sum)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::io::recording::Recording;
+    use crate::io::rig::Rig;
+
+    const ESTIMATOR: Estimator = Estimator { bandwidth_hz: 20.0 };
+    const TURN: f64 = 0.5;
+
+    /// An axis that swings over a few turns of [`TURN`]; its rows begin `from` s into the swing.
+    fn track(from: f64) -> BlockedRecording {
+        let time_s: Vec<f64> = (0..8000).map(|row| f64::from(row) * 1e-3).collect();
+        let angle = |t: f64| 0.9 * (1.3 * t).sin() + 0.4 * (3.1 * t).sin();
+        let speed = |t: f64| 1.17 * (1.3 * t).cos() + 1.24 * (3.1 * t).cos();
+        let recording = Recording {
+            command: time_s.iter().map(|t| (4.0 * (t + from)).sin()).collect(),
+            position_counts: time_s.iter().map(|t| (1e5 * angle(t + from)).round()).collect(),
+            time_s,
+            ..Recording::default()
+        };
+        let mut rig = Rig::of_values(0.01, 0.0, 0.0);
+        rig.encoder.counts_per_unit = 1e5;
+        let mut track = BlockedRecording::new(&recording, &rig);
+        let at: Vec<f64> = track.blocks.start.iter().map(|start| start + from).collect();
+        track.motion.v = at.iter().map(|t| speed(*t)).collect();
+        track.motion.x = at.iter().map(|t| angle(*t)).collect();
+        track
+    }
+
+    /// The predictor that is found where a model leaves `rest` of a track at a block, beside noise of
+    /// a unit, under a drive's force of `force`.
+    fn found(
+        rest: &dyn Fn(&BlockedRecording, usize) -> f64,
+        force: &dyn Fn(&BlockedRecording, usize) -> f64,
+    ) -> Option<&'static str> {
+        let mut random = 7_u64;
+        let mut noise = move || {
+            random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (random >> 11) as f64 / (1_u64 << 53) as f64 * 3.46 - 1.73
+        };
+        let tracks = [track(0.0), track(11.0)];
+        let mut of = |track: &BlockedRecording| Residuals {
+            force: vec![(0..track.block_count()).map(|j| force(track, j)).collect()],
+            nominal: Vec::new(),
+            refit: Vec::new(),
+            patched: vec![(0..track.block_count()).map(|j| rest(track, j) + noise()).collect()],
+        };
+        let all = tracks.each_ref().map(&mut of);
+        let left = |i: usize| Left::new(&tracks[i..=i], &all[i], &ESTIMATOR);
+        follows(&left(0), &left(1), &ESTIMATOR, Some(TURN)).map(|(what, _)| what)
+    }
+
+    fn no_force(_: &BlockedRecording, _: usize) -> f64 {
+        0.0
+    }
+
+    #[test]
+    fn noise_follows_nothing() {
+        assert_eq!(found(&no_force, &no_force), None);
+    }
+
+    #[test]
+    fn a_residual_of_speed_place_or_angle_does_not_pass_for_random() {
+        let found = |rest| found(rest, &no_force);
+        let size = |what: Option<&'static str>, word: &str| {
+            assert!(what.is_some_and(|what| what.contains(word)), "{word}: {what:?}")
+        };
+        size(found(&|track, j| -2.0 * track.motion.v[j].signum()), "dry friction");
+        size(found(&|track, j| -1.5 * track.motion.v[j]), "viscous friction");
+        size(found(&|track, j| 3.0 * track.motion.x[j]), "along the travel");
+        size(found(&|track, j| 2.0 * (TAU * 2.0 * track.motion.x[j] / TURN).sin()), "angle of the turn");
+    }
+
+    #[test]
+    fn a_force_along_the_motion_is_no_friction() {
+        assert_eq!(found(&|track, j| 2.0 * track.motion.v[j].signum(), &no_force), None);
+    }
+
+    #[test]
+    fn a_delay_counts_only_if_command_and_motion_agree_on_it() {
+        let force = |track: &BlockedRecording, j: usize| 20.0 * (4.0 * track.blocks.start[j]).sin();
+        let late = |track: &BlockedRecording, j: usize| {
+            20.0 * (4.0 * (track.blocks.start[j] - 0.04)).sin() - force(track, j)
+        };
+        assert!(found(&late, &force).is_some_and(|what| what.contains("acts later")));
+    }
+}

@@ -7,9 +7,9 @@ use super::units;
 use device_sim::error::Error;
 use std::path::Path;
 
-/// Clocks that begin with the recording tell two runs apart where their lengths differ by this
-/// part.
-const ANOTHER_LENGTH: f64 = 0.01;
+/// Clocks that begin with the recording distinguish two runs whose lengths differ by this part: two
+/// loggers of one run do not stop a tenth of it apart.
+const ANOTHER_LENGTH: f64 = 0.1;
 /// Words by which people distinguish their runs.
 const RUNS: &str = "fit holdout train training test val valid validation verify estimation identification run runs trial take \
                     rep repeat exp experiment session rec recording log slow slower fast faster \
