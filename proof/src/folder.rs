@@ -90,6 +90,20 @@ pub(crate) fn paths(path: &Path) -> Result<Paths, String> {
     Ok(Paths { rig: path.join("rig.toml"), fit, holdout })
 }
 
+/// The beliefs about the machines of a folder, by case; none where it has no `believed.tsv`.
+///
+/// # Errors
+/// One sentence: what cannot be read, and where.
+pub(crate) fn beliefs(top: &Path) -> Result<BTreeMap<String, ExpectedAnswer>, String> {
+    let path = top.join("believed.tsv");
+    if !path.is_file() {
+        return Ok(BTreeMap::new());
+    }
+    let text = std::fs::read_to_string(&path).map_err(|e| format!("cannot read {}: {e}", path.display()))?;
+    let list = expected_answer::parse(&text).map_err(|e| format!("{}, {e}", path.display()))?;
+    Ok(list.into_iter().collect())
+}
+
 fn keys(top: &Path) -> Result<BTreeMap<String, Truth>, String> {
     let read = |path: &PathBuf| {
         std::fs::read_to_string(path).map_err(|e| format!("cannot read {}: {e}", path.display()))
@@ -106,9 +120,7 @@ fn keys(top: &Path) -> Result<BTreeMap<String, Truth>, String> {
         return cases.iter().map(one).collect();
     }
     if believed.is_file() {
-        let list =
-            expected_answer::parse(&read(&believed)?).map_err(|e| format!("{}, {e}", believed.display()))?;
-        return Ok(list.into_iter().map(|(id, belief)| (id, Truth::Believed(belief))).collect());
+        return Ok(beliefs(top)?.into_iter().map(|(id, belief)| (id, Truth::Believed(belief))).collect());
     }
     Err(format!(
         "{} has neither key.json nor believed.tsv, so its cases cannot be judged; docs/benchmark.md describes the format",

@@ -235,8 +235,8 @@ mod tests {
         track
     }
 
-    /// The predictor that is found where a model leaves `rest` of a track at a block, beside noise of
-    /// a unit, under a drive's force of `force`.
+    /// The predictor that is found where a model leaves `rest` of a track at a block and noise of a
+    /// unit, under a drive's force of `force`.
     fn found(
         rest: &dyn Fn(&BlockedRecording, usize) -> f64,
         force: &dyn Fn(&BlockedRecording, usize) -> f64,

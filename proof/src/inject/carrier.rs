@@ -1,9 +1,11 @@
 //! A carrier: a case of a real machine in whose recordings an effect is concealed.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use super::rig_file::RigFile;
 use crate::dynamics::recording::Recording;
+use crate::expected_answer::ExpectedAnswer;
 use crate::folder;
 use crate::tool::Paths;
 
@@ -15,6 +17,8 @@ pub(crate) struct Place {
     /// The machine: the name up to its first hyphen.
     pub(crate) machine: String,
     pub(crate) paths: Paths,
+    /// The names that are believed of the machine as it is, where somebody wrote them down.
+    pub(crate) believed: Option<ExpectedAnswer>,
 }
 
 /// A carrier that has been read.
@@ -33,6 +37,7 @@ pub(crate) struct Carrier {
 pub(crate) fn find(tops: &[PathBuf]) -> Result<Vec<Place>, String> {
     let mut list: Vec<Place> = Vec::new();
     for top in tops {
+        let beliefs = folder::beliefs(top)?;
         let inner = top.join("cases");
         let dir = if inner.is_dir() { inner } else { top.clone() };
         let entries =
@@ -41,7 +46,7 @@ pub(crate) fn find(tops: &[PathBuf]) -> Result<Vec<Place>, String> {
         folders.push(dir);
         folders.sort();
         for folder in folders.iter().filter(|f| f.join("rig.toml").is_file()) {
-            list.push(place(folder)?);
+            list.push(place(folder, &beliefs)?);
         }
     }
     if list.is_empty() {
@@ -52,11 +57,11 @@ pub(crate) fn find(tops: &[PathBuf]) -> Result<Vec<Place>, String> {
     Ok(list)
 }
 
-fn place(folder: &Path) -> Result<Place, String> {
+fn place(folder: &Path, beliefs: &BTreeMap<String, ExpectedAnswer>) -> Result<Place, String> {
     let full = folder.canonicalize().map_err(|e| format!("cannot read {}: {e}", folder.display()))?;
     let id = full.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
     let machine = id.split('-').next().unwrap_or(&id).to_string();
-    Ok(Place { paths: folder::paths(folder)?, id, machine })
+    Ok(Place { paths: folder::paths(folder)?, believed: beliefs.get(&id).cloned(), id, machine })
 }
 
 impl Carrier {

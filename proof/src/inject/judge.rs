@@ -5,6 +5,7 @@ use serde_json::Value;
 
 use super::plain::{Best, Found};
 use super::regress::Oracle;
+use crate::expected_answer::ExpectedAnswer;
 use crate::tool::{Answer, Named};
 
 /// A case with the answers to it.
@@ -23,6 +24,8 @@ pub(crate) struct Case {
     pub(crate) lost: Lost,
     /// Names that the tool gives on the untouched machine.
     pub(crate) own: Vec<Named>,
+    /// The names that are believed of the untouched machine, where somebody wrote them down.
+    pub(crate) believed: Option<ExpectedAnswer>,
     /// The plain rivals: what they find here, and what they find on the untouched machine.
     pub(crate) plain: Plain,
     pub(crate) plain_own: Plain,
@@ -138,6 +141,12 @@ impl Case {
         all.iter().filter(|n| right(n) || !self.is_own(n)).map(|n| (n, right(&n))).collect()
     }
 
+    /// True if a name, or its class, is believed of the untouched machine: a rig without friction
+    /// lacks it whether or not the tool says so before something is concealed.
+    pub(crate) fn is_believed(&self, name: &str, class: &[String]) -> bool {
+        self.believed.as_ref().is_some_and(|belief| belief.allows(name, class))
+    }
+
     pub(crate) fn said(&self) -> Said {
         if self.answer.is_err() {
             return Said::NoReport;
@@ -175,6 +184,7 @@ impl Case {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
+    use crate::expected_answer;
     use crate::judge::tests::says;
     use serde_json::json;
 
@@ -194,6 +204,7 @@ pub(crate) mod tests {
             answer: Ok(says(names)),
             lost: Lost::NotListed,
             own: says(own).effects,
+            believed: None,
             plain: Plain { by_share: vec![found(hidden, 0.3), found("cogging", 0.06)], ..Plain::default() },
             plain_own: Plain::default(),
             seconds: 1.0,
@@ -215,6 +226,18 @@ pub(crate) mod tests {
         let said = |best, least| plain.plain_said(best, least);
         assert_eq!((said(Best::TakesMost, 0.15), said(Best::TakesMost, 0.4)), (Said::Found, Said::Silent));
         assert_eq!(said(Best::Evidence, 0.15), Said::Silent);
+    }
+
+    #[test]
+    fn a_name_that_is_believed_of_the_machine_is_known_as_such() {
+        let mut case = case("quadratic_drag", &[("cogging", 0.9)], &[]);
+        assert!(!case.is_believed("cogging", &[]));
+        let line = "axis-A\tnone\tcogging\tsomebody\n";
+        let belief = expected_answer::parse(line).unwrap().remove(0).1;
+        case.believed = Some(belief);
+        assert!(case.is_believed("cogging", &[]) && !case.is_believed("torque_ripple", &[]));
+        assert!(case.is_believed("torque_ripple", &["torque_ripple".into(), "cogging".into()]));
+        assert_eq!(case.said(), Said::False, "what was said stays what it was");
     }
 
     #[test]

@@ -232,6 +232,7 @@ fn run_case(
         lost: judge::lost(&report, wish.hidden),
         answer,
         own: chosen.untouched.answer.effects.clone(),
+        believed: chosen.place.believed.clone(),
         plain: plain(&ground.written(&drawn)),
         plain_own: chosen.plain.get_or_init(|| plain(&ground.carrier)).clone(),
         seconds,

@@ -10,6 +10,7 @@ use super::judge::{Case, Plain, Said};
 use super::plain::{Best, Found};
 use crate::metrics::{BELIEVED, Reliability};
 use crate::stats::Rate;
+use crate::tool::Named;
 
 fn row(out: &mut String, cells: &[String]) {
     let _ = writeln!(out, "| {} |", cells.join(" | "));
@@ -55,11 +56,19 @@ impl Method {
         }
     }
 
-    /// For every new name, whether it is right.
-    fn names(self, case: &Case) -> Vec<bool> {
+    /// For every new name, whether it is right, and whether it is right or believed of the machine.
+    fn names(self, case: &Case) -> Vec<(bool, bool)> {
         match self {
-            Method::Tool => case.new_names().iter().map(|n| n.1).collect(),
-            Method::Plain(best, share) => case.plain_names(best, share).iter().map(|n| n.1).collect(),
+            Method::Tool => case
+                .new_names()
+                .into_iter()
+                .map(|(named, right)| (right, right || case.is_believed(&named.name, named.judged_class())))
+                .collect(),
+            Method::Plain(best, share) => case
+                .plain_names(best, share)
+                .into_iter()
+                .map(|(name, right)| (right, right || case.is_believed(name, &[])))
+                .collect(),
         }
     }
 }
@@ -90,6 +99,7 @@ fn overall(out: &mut String, cases: &[&Case]) {
             "found at 1 ×, solvable",
             "found, not solvable",
             "false among names",
+            "neither concealed nor believed of the machine",
         ],
     );
     let part = |factor: f64, solved: bool| -> Vec<&Case> {
@@ -104,8 +114,11 @@ fn overall(out: &mut String, cases: &[&Case]) {
         .flat_map(|best| PLAIN_SHARES.map(|share| Method::Plain(best, share)));
     for method in [Method::Tool].into_iter().chain(plain) {
         let found = |list: &[&Case]| rate(list, |c| method.said(c) == Said::Found).text();
-        let mut wrong = Rate::default();
-        cases.iter().flat_map(|c| method.names(c)).for_each(|right| wrong.add(!right));
+        let (mut wrong, mut unbelieved) = (Rate::default(), Rate::default());
+        for (right, known) in cases.iter().flat_map(|c| method.names(c)) {
+            wrong.add(!right);
+            unbelieved.add(!known);
+        }
         row(
             out,
             &[
@@ -114,6 +127,7 @@ fn overall(out: &mut String, cases: &[&Case]) {
                 found(&part(1.0, true)),
                 found(&part(0.0, false)),
                 wrong.text(),
+                unbelieved.text(),
             ],
         );
     }
@@ -143,22 +157,29 @@ fn grouped(out: &mut String, title: &str, cases: &[&Case], key: impl Fn(&Case) -
 }
 
 fn reliability(out: &mut String, cases: &[&Case]) {
-    let names: Vec<(f64, bool)> = cases
-        .iter()
-        .flat_map(|c| c.new_names().into_iter().map(|(n, right)| (n.confidence, right)))
-        .collect();
+    let of = |right: &dyn Fn(&Case, &Named, bool) -> bool| -> Reliability {
+        let names: Vec<(f64, bool)> = cases
+            .iter()
+            .flat_map(|c| {
+                c.new_names().into_iter().map(|(n, is_right)| (n.confidence, right(c, n, is_right)))
+            })
+            .collect();
+        Reliability::of(&names)
+    };
     head(
         out,
         "Reliability: of the tool's names given with a confidence, right",
-        &["confidence", "mean", "right"],
+        &["confidence", "mean", "right", "right or believed of the machine"],
     );
-    let metrics = Reliability::of(&names);
+    let metrics = of(&|_, _, right| right);
+    let believed = of(&|case, named, right| right || case.is_believed(&named.name, named.judged_class()));
     for (i, bin) in metrics.bins.iter().enumerate() {
         let Some(mean) = bin.mean() else { continue };
         let range = format!("{:.1}–{:.1}", i as f64 / 10.0, (i + 1) as f64 / 10.0);
-        row(out, &[range, format!("{mean:.2}"), bin.right.text()]);
+        row(out, &[range, format!("{mean:.2}"), bin.right.text(), believed.bins[i].right.text()]);
     }
-    row(out, &[format!("{BELIEVED} or more"), "–".into(), metrics.believed.text()]);
+    let last = [format!("{BELIEVED} or more"), "–".into(), metrics.believed.text(), believed.believed.text()];
+    row(out, &last);
 }
 
 /// A reason without its figures, so that like reasons count together.
@@ -255,7 +276,10 @@ pub(crate) fn json(first: &str, cases: &[&Case]) -> Value {
         let names: Vec<Value> = c
             .new_names()
             .iter()
-            .map(|(n, right)| json!({ "name": n.name, "class": n.class, "confidence": n.confidence, "right": right }))
+            .map(|(n, right)| {
+                let believed = c.is_believed(&n.name, n.judged_class());
+                json!({ "name": n.name, "class": n.class, "confidence": n.confidence, "right": right, "believed": believed })
+            })
             .collect();
         let weighed: Vec<Value> = c
             .answer
