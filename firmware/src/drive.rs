@@ -63,7 +63,8 @@ impl<B: CodeBus> MotorDac for SerialDac<B> {
 /// A timer's pulse width, for an amplifier that takes its set value so, with a line for the
 /// direction.
 pub trait Pulse {
-    /// Pulses of `on` of 32,767 parts of the period from the next period on; 0 is none.
+    /// Sets the width to `on` of 32,767 parts of the period, from the next period on; 0 gives no
+    /// pulses.
     fn set_width(&mut self, on: u16);
 }
 

@@ -82,7 +82,7 @@ pub trait SupplyLevel {
 pub trait Watchdog {
     /// Starts its countdown again.
     fn feed(&mut self);
-    /// True if it stands still while a debugger halts the core.
+    /// Stops it while a debugger halts the core, if `stop` is true.
     fn stop_on_debug(&mut self, stop: bool);
 }
 

@@ -90,7 +90,7 @@ pub trait ConfigFlash {
 /// Why a configuration was not saved. It is in force all the same, until the next reset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StoreError {
-    /// The flash did not do what it was told.
+    /// The flash did not do what was ordered.
     Flash,
     /// No blank cell is left until the device is restarted.
     Full,

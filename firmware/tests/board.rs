@@ -1,7 +1,7 @@
-//! The board itself: `cargo xtask board-test [--board NAME]`, with a debug probe and a board beside
-//! it. Wire PA4 to PC2, the emergency stop, the amplifier's ready line and the strap of the current
-//! monitor to 3 V (PE4, PE5, PE6; on the NUCLEO-F429ZI PF14, PF15, PF12), plug the board's own USB
-//! connector (CN5; CN13) into a PC, and leave the amplifier off.
+//! The board itself: `cargo xtask board-test [--board NAME]`, with a debug probe and a board
+//! connected. Wire PA4 to PC2, the emergency stop, the amplifier's ready line and the strap of the
+//! current monitor to 3 V (PE4, PE5, PE6; on the NUCLEO-F429ZI PF14, PF15, PF12), plug the board's
+//! own USB connector (CN5; CN13) into a PC, and leave the amplifier off.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 #![allow(unexpected_cfgs, reason = "the macro of embedded-test asks for one of its own")]
 

@@ -36,7 +36,7 @@ pub struct Queues {
     large_orders: Queue<LargeOrder, 2>,
     // 25 ms of samples: as long as telemetry may hang before it is found out.
     outputs: Queue<Ticked, 256>,
-    // 1 KiB: more than any command; where it is full, USB tells the PC to wait.
+    // 1 KiB: more than any command; while it is full, USB makes the PC wait.
     from_pc: Queue<Packet, 16>,
     // 4 KiB: what a full-speed host takes in 4 ms at worst, 40 ms of stream.
     to_pc: Queue<Packet, 64>,

@@ -86,9 +86,9 @@ impl<D: SpiDevice> Accelerometer<D> {
         self.device.transfer_in_place(bytes).map_err(|_| TiltError::Absent)
     }
 
-    /// Looks for the sensor and sets it up if it has just appeared, or has forgotten what it was
-    /// told: one that loses its power alone comes back with its own registers, in power-down, under
-    /// the identity that it had before.
+    /// Looks for the sensor and sets it up if it has just appeared or has lost its settings: a
+    /// sensor that alone loses its power comes back with its reset values, in power-down, under the
+    /// identity that it had before.
     fn find(&mut self) -> Result<Model, TiltError> {
         let mut identity = [READ | WHO_AM_I, 0];
         self.transfer(&mut identity)?;
