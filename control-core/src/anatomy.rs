@@ -290,9 +290,9 @@ impl Insertion {
     /// Returns the extra depth of the next layer where the tip comes to it, due to the remaining
     /// indentation of the last wall.
     ///
-    /// With l left at the puncture and none from R on, l·(R − x)/ρ remains at x, ρ the way from the
-    /// puncture to R. The tip comes to a layer at T, which lies at `T + l·(R − x)/ρ` then, at `x =
-    /// T + (R − T)·l/(l + ρ)`.
+    /// With l left at the puncture and zero from R on, l·(R − x)/ρ remains at x, where ρ is the way
+    /// from the puncture to R. A layer at T is then at `T + l·(R − x)/ρ`, and the tip reaches it at
+    /// `x = T + (R − T)·l/(l + ρ)`.
     fn carried_along(&self, anatomy: &Anatomy) -> I16F16 {
         let Some((wall, origin)) = self.last_given(anatomy) else { return I16F16::ZERO };
         let before = origin.saturating_add(wall.relieved).saturating_sub(self.top(self.touched));

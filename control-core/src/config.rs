@@ -81,8 +81,8 @@ pub struct Mechanism {
     pub mass: Grams,
     /// Dry friction along the needle, 0–10 N.
     pub dry_friction: Newtons,
-    /// From the reading of the encoder to the torque at the shaft, beside the time for which a code
-    /// is held, 20–1,000 µs.
+    /// The delay from the reading of the encoder to the torque at the shaft, 20–1,000 µs, without
+    /// the time for which a code is held.
     pub delay_us: u16,
 }
 
@@ -177,7 +177,7 @@ impl DacWidth {
     pub const BITS_8: Self = Self(8);
     /// The microcontroller's own.
     pub const BITS_12: Self = Self(12);
-    /// An external converter, or a timer's pulse width beside a line for the direction.
+    /// An external converter, or a timer's pulse width with a line for the direction.
     pub const BITS_16: Self = Self(16);
 
     /// The number of bits.

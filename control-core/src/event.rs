@@ -176,7 +176,7 @@ impl Limits {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[repr(u8)]
 pub enum VesselState {
-    /// Above it, or there is none.
+    /// Above the vessel, or there is no vessel.
     #[default]
     Outside = 0,
     /// Pushing in the near wall.

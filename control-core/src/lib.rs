@@ -2,10 +2,10 @@
 //! out.
 //!
 //! A tick, as data: count → [`kinematics`] (depth, speed) → [`anatomy`] (which layers, given the
-//! angle) → `law` (the force law) → torque, with what [`compensation`] feeds forward beside it →
+//! angle) → `law` (the force law) → torque, plus the torque that [`compensation`] feeds forward →
 //! [`safety`] (limit, fade-in, slew) → DAC code. [`controller::Controller`] strings them together
-//! and holds the operating mode; [`config`] is what a person writes and [`plan`] what may run, or
-//! the reason why not.
+//! and holds the operating mode; [`config`] is what a person writes, and [`plan`] is what may run,
+//! or the reason why it may not.
 //!
 //! This crate may not touch hardware, allocate, block, use floating point or `unsafe`. The board
 //! and the simulator run the very same code.

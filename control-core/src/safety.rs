@@ -90,7 +90,7 @@ impl DacScale {
             mid_scale,
             zero: mid_scale + i32::from(device.dac_zero),
             sign: if device.motor_reversed { -1 } else { 1 },
-            // As far both ways, wherever zero lies.
+            // The same span both ways, wherever zero is.
             span: i32::from(span) - i32::from(device.dac_zero).abs(),
         }
     }

@@ -1,5 +1,5 @@
-//! A tick of what is fed forward: from the rotor's angle, the speed and the tilt to a torque beside
-//! the law's.
+//! A tick of the feedforward: computes a torque from the rotor's angle, the speed and the tilt,
+//! which is added to the law's.
 //!
 //! Waves are summed in even ticks and ripple in odd ones, weight and gains follow every sixteenth:
 //! at 100 mm/s an order of 50 turns by a tenth of a radian in the tick that this costs.

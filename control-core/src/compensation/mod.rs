@@ -54,7 +54,7 @@ pub struct Compensation {
 /// A part of a force that repeats with the rotor's turn: `amplitude·sin(order·θ + phase)`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Wave {
-    /// Periods a turn, up to an eighth of the counts; 0 is none.
+    /// Periods a turn, up to an eighth of the counts; 0 means no wave.
     pub order: u16,
     /// In the unit of the force.
     pub amplitude: I16F16,

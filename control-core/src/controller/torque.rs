@@ -1,5 +1,5 @@
-//! The torque of a tick: what the law or the excitation asks for, what is fed forward beside it,
-//! and what the limits leave of it.
+//! The torque of a tick: the law or the excitation asks for a torque, the feedforward is added, and
+//! the limits reduce the sum.
 
 use super::{Core, Mode};
 use crate::compensation::feedforward::RotorState;
@@ -49,7 +49,7 @@ impl Core {
         }
     }
 
-    /// `wanted` and `limits` with what is fed forward beside the law or the excitation.
+    /// Returns `wanted` and `limits` with the feedforward added to the law or the excitation.
     #[inline(always)]
     pub(super) fn compensated(
         &mut self,

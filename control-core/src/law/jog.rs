@@ -265,7 +265,7 @@ fn check_along(limits: &ForceLimits) -> Result<(), Refusal> {
     Ok(())
 }
 
-/// The stretch at which `depth` lies at `travel` along the needle, no less than 1.
+/// Returns the stretch, at least 1, at which the needle reaches `depth` after `travel`.
 fn reaching(travel: I16F16, depth: I16F16) -> I8F24 {
     let wide = (i64::from(travel.to_bits()) << 24) / i64::from(depth.to_bits().max(1));
     I8F24::saturating_from_num(fixed::types::I40F24::from_bits(wide)).max(I8F24::ONE)

@@ -54,7 +54,7 @@ pub(crate) struct Response {
     /// Along the needle, positive against insertion.
     pub(crate) force: Elements,
     pub(crate) state: State,
-    /// Across the needle: computed and told, for this device cannot push sideways.
+    /// Across the needle: computed and reported only, because this device cannot push sideways.
     pub(crate) lateral: Newtons,
     /// The needle has just been turned further than tissue lets it.
     pub(crate) barrier: bool,
@@ -112,8 +112,8 @@ macro_rules! laws {
         pub(crate) enum Memory { $($name($module::Memory)),+ }
 
         impl Law {
-            /// The steepest slope with which it holds a needle inside tissue, beside its walls, in
-            /// N/mm.
+            /// The steepest slope, in N/mm, with which it holds a needle inside tissue, apart from
+            /// its walls.
             pub(crate) fn hold(&self) -> I16F16 {
                 match self { $(Law::$name(config) => config.hold()),+ }
             }

@@ -2,8 +2,8 @@
 //! second order until it gives way; then the tip cuts against a *tracking wall*, which follows it
 //! at a distance that makes the cutting force of its layer, while LuGre friction rubs along the
 //! shaft; on the way out both act the other way, cutting with magnitudes of its own. A fixture
-//! holds the direction of entry: its lateral force is computed and told, for this device turns
-//! freely.
+//! holds the direction of entry: its lateral force is computed and reported only, because this
+//! device turns freely.
 //!
 //! Tracking wall: `z = x − w`, `w` dragged so that `−F_out/K ≤ z ≤ F_in/K`, `F = K·z`. A needle
 //! that has not gone on for 20 ms has stopped: `w` comes after it with a time constant until only
@@ -87,7 +87,7 @@ pub struct Lugre {
 pub struct Fixture {
     /// Lateral force for each milliradian off the direction of entry, N, at most 0.1.
     pub per_mrad: Newtons,
-    /// Largest angle off it, 1–785 mrad: beyond it a barrier is told.
+    /// Largest angle off it, 1–785 mrad; beyond it a barrier is reported.
     pub largest: Milliradians,
 }
 

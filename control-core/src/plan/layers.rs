@@ -93,8 +93,8 @@ fn check_layers(config: &Config) -> Result<(), Refusal> {
     Ok(())
 }
 
-/// The depth at which the layer's wall gives way with the needle straight in; where there is none,
-/// its top.
+/// The depth at which the layer's wall gives way with the needle straight in; the layer's top if it
+/// has no wall.
 fn gives_way(layer: &Layer) -> I16F16 {
     layer.depth.0.saturating_add(layer.wall.map_or(I16F16::ZERO, |wall| wall.puncture_travel.0))
 }

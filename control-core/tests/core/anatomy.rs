@@ -19,7 +19,7 @@ fn mrad(degrees: f64) -> Milliradians {
 /// A layer, and the path in mm at which it was met.
 type Met = (u8, f64);
 
-/// A needle at an angle, which goes where it is told at 10 mm/s.
+/// A needle at an angle, which goes where it is commanded at 10 mm/s.
 struct Needle {
     core: Controller,
     tilt: Milliradians,

@@ -398,7 +398,7 @@ fn too_strong_and_unstable_compensations_are_refused() {
     let allowed = |stiffness: f64| refused(|device| device.limits.stiffness.0 = q(stiffness));
     assert_eq!(allowed(5.98), None);
     assert!(matches!(allowed(6.03), Some(Refusal::CompensationUnstable { .. })), "{:?}", allowed(6.03));
-    // Without friction there is none to take away.
+    // Without friction there is nothing to take away.
     let without = |device: &mut Device| {
         device.limits.stiffness.0 = q(6.9);
         (device.compensation.inwards, device.compensation.outwards) =

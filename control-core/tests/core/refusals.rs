@@ -268,8 +268,8 @@ fn a_patient_may_lower_the_devices_ceiling_but_not_raise_it() {
     assert_eq!(wants(2.87), None);
     let refused = wants(2.9);
     assert!(matches!(refused, Some(Refusal::AboveCeiling { .. })), "{refused:?}");
-    // The default tissue asks for up to 1.2 N at the end of the travel: what a patient may not ask
-    // for is told.
+    // The default tissue asks for up to 1.2 N at the end of the travel: a patient that asks for
+    // more than its largest force is refused.
     assert!(matches!(wants(0.9), Some(Refusal::TooStrong { layer: 0, .. })));
     let mut config = Config::commissioned_virtual();
     config.patient.largest_force = Some(Newtons(q(2.0)));

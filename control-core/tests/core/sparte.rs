@@ -271,7 +271,7 @@ fn the_wall_relaxes_in_the_time_that_the_profile_says() {
         let (moving, held) = (force(&needle.tick()), 0.6);
         let seconds = f64::from(relax_ms) * 1e-3;
         let left = force(&needle.rest(seconds)) - held;
-        // The time constant: 1/e is left, with the 20 ms in which a stop is told.
+        // The time constant: 1/e remains. A stop is noticed after 20 ms.
         let late = 0.02;
         let wanted = (moving - held) * (-(seconds - late) / seconds).exp();
         assert!((left - wanted).abs() < 0.05 * (moving - held), "{relax_ms} ms: {left} N left, not {wanted}");

@@ -55,8 +55,8 @@ fn rising(depth: f64, speed: f64, angle: f64) -> f64 {
     0.1 * depth * (0.8 + 0.05 * speed) * (0.6 + 0.4 * angle)
 }
 
-/// The picture's surface moves in the tissue: the law counts depth from it, and from where it was
-/// at rest once the picture stands still.
+/// The picture's surface moves in the tissue: the law counts depth from it, and, once the picture
+/// freezes, from where the surface was at rest.
 #[test]
 fn depth_may_count_from_a_displaced_surface() {
     let config = config(table(rising));

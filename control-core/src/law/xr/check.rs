@@ -41,7 +41,7 @@ pub(super) fn check(table: &ForceTable, limits: &ForceLimits) -> Result<(), Refu
     for (index, &force) in table.forces.iter().enumerate() {
         let (knot, cell) = (index / cells, index % cells);
         let least = match knot.checked_sub(1) {
-            // Nearer than this, slopes are not told well: 0.05 mm, less a rounding.
+            // Closer knots give inaccurate slopes: at least 0.05 mm, less a rounding.
             Some(above) => depth(above, cell).saturating_add(milli(49)),
             None => I16F16::ZERO,
         };

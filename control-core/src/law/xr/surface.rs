@@ -2,8 +2,8 @@
 //! counted from there instead of from where the surface was at rest.
 //!
 //! Whoever computes a picture may be late, wrong or gone. So the displacement is bounded, changes
-//! no faster than a slow hand, and goes back to 0 by itself if it is not renewed: a picture that
-//! stands still takes its effect with it.
+//! no faster than a slow hand, and goes back to 0 by itself if it is not renewed: when a picture
+//! freezes, its effect ends.
 
 use crate::units::Millimetres;
 use fixed::types::I16F16;
@@ -24,7 +24,7 @@ pub(crate) struct Surface {
 }
 
 impl Surface {
-    /// The surface lies at `displacement` past its place at rest, along the needle.
+    /// Moves the surface to `displacement` past its place at rest, along the needle.
     pub(crate) fn follow(&mut self, displacement: Millimetres) {
         self.wanted = displacement.0.clamp(-LARGEST, LARGEST);
         self.left = RENEWED_WITHIN;
@@ -65,7 +65,7 @@ mod tests {
             before = now;
         }
         assert!((before.to_num::<f64>() - 1.0).abs() < 1e-4, "{before} mm");
-        // The picture stands still.
+        // The picture freezes.
         let after: [I16F16; 2_000] = core::array::from_fn(|_| surface.tick());
         assert!(after[300] > I16F16::from_num(0.99) && after[1_100] == I16F16::ZERO, "{}", after[1_100]);
         surface.follow(Millimetres(I16F16::MIN));

@@ -85,7 +85,7 @@ impl Twin {
     }
 
     /// DAC steps away from mid-scale, before rounding, with the amplifier on since the first call.
-    /// What the core has `told` of the tip's way is checked against the anatomy.
+    /// The tip's path that the core reports (`told`) is checked against the anatomy.
     pub(crate) fn tick(&mut self, count: i32, told: &TickOutput) -> f64 {
         let depth = f64::from(count) * self.mm_per_count;
         let speed = self.speed(count);
@@ -260,7 +260,7 @@ impl Twin {
         sum
     }
 
-    /// `rubs`: the core has told of friction.
+    /// `rubs`: the core has reported friction.
     fn friction(&mut self, depth: f64, stretch: f64, rubs: bool) -> f64 {
         let layers = &self.config.patient.layers;
         let first_wall = layers.iter().position(|l| l.wall.is_some());
