@@ -354,7 +354,7 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
 
     fn event(&mut self, tick: u64, kind: EventKind) {
         if self.waiting.borrow_mut().events.is_full() {
-            // The missing number tells the PC that a frame was lost.
+            // The missing number shows the PC that a frame was lost.
             self.waiting.borrow_mut().events.pop_front();
             self.sequence = self.sequence.wrapping_add(1);
         }

@@ -340,8 +340,8 @@ pub enum Command {
     /// The rotor's angle is zero at this many counts past the zero, until the device is restarted;
     /// `None`: it is not known. Only while torque is off.
     Index(Option<i32>),
-    /// [`Command::ConfigureDevice`] with what this device has told of itself before: taken as it is
-    /// where the seal is its own.
+    /// [`Command::ConfigureDevice`] with a configuration that this device reported before: taken
+    /// unchanged if the seal is its own.
     RestoreDevice(Record),
     /// Marks the device's configuration as found by commissioning: accepted if its own pulses have
     /// shown that the motor and the encoder go together, and only while torque is off. Nothing else

@@ -4,14 +4,14 @@ use crate::codec;
 use control_core::Device;
 use serde::{Deserialize, Serialize};
 
-/// The device's part of the configuration under the seal of the device that told it.
+/// The device's part of the configuration, under the seal of the device that reported it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Record {
     /// The device's part.
     pub device: Device,
-    /// CRC-32 of the device's part and the number of the device. It tells a file of another device,
-    /// and one that was edited, from this one's. It is no secret: a program that forges it gets
-    /// past this, and not past the board's ceilings.
+    /// CRC-32 of the device's part and the number of the device. It distinguishes a file of another
+    /// device, and one that was edited, from this one's. It is no secret: a program that forges it
+    /// gets past this check, but not past the board's ceilings.
     pub seal: u32,
 }
 
