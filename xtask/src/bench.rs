@@ -1,9 +1,10 @@
 //! `cargo xtask bench`: runs the measuring programs there are and puts what they print into one
 //! table. A program gives a row by printing `name=value`, with a name of [`crate::rows`], or as
-//! JSON, `"row": "name", … "value": …`; a peer beside it by `name.peer=who name.peer_value=…`; the
-//! time of an amount of work by `work.subject.unit.amount=seconds`. A row that nothing measures is
-//! left out, and a peer that is not there is named: no number here was written by hand. Lines that
-//! a test of the emulated board begins with a bar are printed below the table as they are.
+//! JSON, `"row": "name", … "value": …`; a peer in the same row by `name.peer=who
+//! name.peer_value=…`; the time of an amount of work by `work.subject.unit.amount=seconds`. A row
+//! that nothing measures is left out, and a missing peer is named: no number here was written by
+//! hand. Lines that a test of the emulated board begins with a bar are printed unchanged below the
+//! table.
 
 mod fit;
 mod programs;

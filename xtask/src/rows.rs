@@ -18,7 +18,7 @@ pub(crate) struct Row {
     /// The goal, where there is one.
     pub(crate) wanted: Option<f64>,
     pub(crate) better: Better,
-    /// Who should stand beside it; where it has not been measured, the table says so.
+    /// The peer to compare with; if it has not been measured, the table says so.
     pub(crate) peer: Option<&'static str>,
 }
 
@@ -26,7 +26,7 @@ const fn row(name: &'static str, unit: &'static str, wanted: Option<f64>, better
     Row { name, unit, wanted, better, peer: None }
 }
 
-/// A row beside which a peer should stand.
+/// A row with a peer to compare with.
 const fn peered(row: Row, peer: &'static str) -> Row {
     Row { peer: Some(peer), ..row }
 }

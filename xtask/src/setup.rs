@@ -18,8 +18,8 @@ fn is_root() -> bool {
         .unwrap_or(false)
 }
 
-/// Fails where the disk that cargo builds on has less than `needed_mib` left beside what the target
-/// folder holds already. A machine without `df` passes.
+/// Fails if the disk that cargo builds on has less than `needed_mib` left in addition to what the
+/// target folder already holds. A machine without `df` passes.
 pub(crate) fn disk(needed_mib: u64) -> Result<(), Error> {
     let target = shell::target();
     let folder = if target.is_dir() { target.clone() } else { shell::top() };
@@ -66,8 +66,8 @@ pub(crate) fn browser() -> Result<(), Error> {
     install(&["chromium"], "the browser test")
 }
 
-/// A Python of our own in `target/`, with exactly these packages (`name==version`) beside what it
-/// already has; its interpreter.
+/// Returns the interpreter of a Python of our own in `target/`, with exactly these packages
+/// (`name==version`) in addition to what it already has.
 pub(crate) fn python(packages: &[&str]) -> Result<PathBuf, Error> {
     let folder = shell::target().join("python");
     let interpreter = folder.join("bin/python");

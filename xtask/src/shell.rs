@@ -45,8 +45,8 @@ pub(crate) fn target() -> PathBuf {
     top().join(env::var_os("CARGO_TARGET_DIR").unwrap_or_else(|| "target".into()))
 }
 
-/// The cargo that runs us, at the top of the repository. What it told us about this crate does not
-/// concern what we start.
+/// The cargo that runs us, at the top of the repository. Its variables about this crate are
+/// removed, because they do not concern what we start.
 pub(crate) fn cargo() -> Command {
     let mut command = Command::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
     command.current_dir(top());

@@ -1,7 +1,7 @@
 //! `cargo xtask site`: the whole simulator as one folder without a server: the page, its modules
-//! inside it, and the device as WebAssembly in the place of the WebSocket. A folder opened from a
-//! disk may load neither modules nor WebAssembly, so that both lie in the page as text.
-//! `board.html` beside it is the page of a real board, over WebSerial.
+//! inside it, and the device as WebAssembly instead of the WebSocket. A folder opened from a disk
+//! may load neither modules nor WebAssembly, so both are in the page as text. `board.html` in the
+//! same folder is the page of a real board, over WebSerial.
 
 use crate::setup;
 use crate::shell::{self, Error};

@@ -151,7 +151,7 @@ fn same_bits() -> Result<(), Error> {
 }
 
 fn board() -> Result<(), Error> {
-    // The tests find the other boards' beside the default one's.
+    // The tests look for the other boards' images next to the default one's.
     for board in &boards::ALL {
         firmware::build(board)?;
     }

@@ -1,6 +1,6 @@
-//! `cargo xtask wasm`: builds what the page computes in the browser and puts it beside the page's
-//! files, with a note of which sources it is from. `cargo xtask test wasm` checks that it is
-//! theirs.
+//! `cargo xtask wasm`: builds what the page computes in the browser and puts it next to the page's
+//! files, with a note of the sources that it was built from. `cargo xtask test wasm` checks that it
+//! was built from the present ones.
 
 use crate::setup;
 use crate::shell::{self, Error};
@@ -103,7 +103,7 @@ fn collect(folder: &Path, files: &mut Vec<PathBuf>) -> io::Result<()> {
     Ok(())
 }
 
-/// FNV-1a, 64 bits: it tells whether something was forgotten, not whether somebody lies.
+/// FNV-1a, 64 bits: it shows that a build was forgotten; it does not prevent forgery.
 fn digest<'a>(parts: impl IntoIterator<Item = &'a [u8]>) -> u64 {
     let mut hash = 0xCBF2_9CE4_8422_2325_u64;
     for part in parts {

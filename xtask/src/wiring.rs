@@ -52,7 +52,7 @@ fn drawn() -> Result<Vec<(PathBuf, String)>, Error> {
         .collect()
 }
 
-/// A row of a table of pins: the pins, and the words beside them.
+/// A row of a table of pins: the pins and their description.
 #[derive(Debug, PartialEq, Eq)]
 struct Row {
     pins: String,

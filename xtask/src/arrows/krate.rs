@@ -27,8 +27,8 @@ impl Crate {
         Ok(Self::of(files.iter().map(|(name, text)| (name.clone(), text.as_str()))))
     }
 
-    /// A crate of sources by their paths below `src`. A program beside a library is the same
-    /// crate's root.
+    /// A crate of sources by their paths below `src`. `lib.rs` is its root; `main.rs` is its root
+    /// if there is no library.
     pub(super) fn of<'a>(files: impl Iterator<Item = (String, &'a str)>) -> Self {
         let mut modules = BTreeMap::new();
         for (file, text) in files {

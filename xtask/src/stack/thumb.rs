@@ -1,11 +1,11 @@
-//! As much of the Thumb instruction set as tells stack use and calls (ARMv7-M Architecture
+//! The part of the Thumb instruction set that shows stack use and calls (ARMv7-M Architecture
 //! Reference Manual, chapter A7).
 
 use crate::elf::{Elf, Symbol};
 use crate::shell::Error;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// The facts that a function's instructions tell.
+/// The facts that a function's instructions show.
 #[derive(Debug, Default)]
 pub(crate) struct Body {
     /// Bytes that it takes from the stack, all branches together.
