@@ -1,9 +1,9 @@
 //! A real board in the browser, over WebSerial and WebUSB, behind functions of plain numbers, bytes
-//! and JSON texts. `page/` is the other side: it opens ports, carries bytes and shows what it is
-//! told, and decides nothing.
+//! and JSON texts. `page/` is the other side: it opens ports, carries bytes and shows what it
+//! receives, and decides nothing.
 //!
-//! The names are exported as they stand, which the language counts as unsafe; there is no other
-//! unsafe code.
+//! The names are exported unmangled, which the language counts as unsafe; there is no other unsafe
+//! code.
 
 pub mod dfu;
 pub mod session;

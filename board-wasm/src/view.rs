@@ -26,7 +26,7 @@ const LIMITS: [(Limits, &str); 6] = [
     (Limits::ESTIMATED, "force estimated"),
 ];
 
-/// The state of a board as its frames tell it.
+/// The state of a board as its frames report it.
 #[derive(Debug, Default)]
 pub struct View {
     reception: Reception,
@@ -187,7 +187,7 @@ impl View {
             lost_samples: counts.lost_samples,
             events: &self.events,
         };
-        // Only a map with keys that are no strings cannot be written, and there is none.
+        // Only a map whose keys are not strings cannot be written, and there is no such map here.
         serde_json::to_string(&shown).unwrap_or_default()
     }
 }
