@@ -53,7 +53,7 @@ function decoder({ encoding, schema, schemaName }) {
   return (data) => type.decode(new Uint8Array(data.buffer, data.byteOffset, data.byteLength));
 }
 
-/** A client that has subscribed to all there is, and everything that it has been told. */
+/** A client that has subscribed to all there is, and everything that it has received. */
 async function connect(address) {
   const client = new FoxgloveClient({ ws: new WebSocket(address, [SUBPROTOCOL]) });
   const told = { info: null, channels: new Map(), heard: {}, errors: [], refusedCalls: [], closed: false };
@@ -149,7 +149,7 @@ async function checkNoOrders(client, told, page) {
   const since = poses.slice(from);
   assert(since.length > 100, `${since.length} poses meanwhile`);
   assert(since.every((pose) => pose.motor_n === 0 && pose.state === "idle"), "the motor moved");
-  // The same from the page does start it, so that the above could have been seen. A limit comes with the start, and both are told.
+  // The same from the page does start it, so that the above could have been seen. A limit comes with the start, and both are reported.
   page.send(JSON.stringify({ do: "start" }));
   await wait("the start as an event", () => happened("started") > 0);
   await wait("torque after a start from the page", () => newest().state !== "idle" && newest().motor_n !== 0);

@@ -83,7 +83,7 @@ impl Bootloader {
         self.busy_ms = self.busy_ms.saturating_sub(ms);
     }
 
-    /// Plugs it in again: what it was told is forgotten, the flash is not.
+    /// Plugs it in again: it forgets the commands that it received, but keeps the flash.
     pub fn plug_in_again(&mut self) {
         let flash = std::mem::take(&mut self.flash);
         *self = Self { flash, ..Self::default() };

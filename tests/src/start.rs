@@ -56,7 +56,7 @@ impl Start {
         (board, self.pc.clone())
     }
 
-    /// Returns what was kept beside the board.
+    /// Returns the value that was kept with the board.
     ///
     /// # Panics
     ///

@@ -208,7 +208,7 @@ impl Array {
     }
 
     /// A write of the firmware to a register, which may be the interface's, at the instant `at`.
-    /// The time for which the core then stands still, in nanoseconds.
+    /// Returns the time for which the core then stalls, in nanoseconds.
     pub(super) fn register_written(&mut self, address: u64, value: u32, at: u64) -> u64 {
         match address {
             FLASH_KEYR => {

@@ -2,8 +2,8 @@
 //! holds.
 //!
 //! The official decoder gives `serde_json` a feature that changes how numbers in tagged messages
-//! are read, for every crate that is built beside it, so that the tests would need a second build
-//! of everything. The parser of the format strings and the framing are the official crates; frames
+//! are read, for every crate that is built with it, so the tests would need a second build of
+//! everything. The parser of the format strings and the framing are the official crates; frames
 //! hold an index, then the arguments (the defmt book, "Encoding").
 
 use std::collections::BTreeMap;

@@ -73,7 +73,7 @@ impl Accelerometer {
         registers
     }
 
-    /// Takes its power away for a moment, and its alone: it forgets what it was told.
+    /// Removes its power for a moment, and only its own: it loses its settings.
     pub fn lose_power(&mut self) {
         self.registers = Self::reset(self.model);
         self.address = None;

@@ -249,8 +249,8 @@ impl Parking {
         assert!(self.0.is_empty() || self.0.len() >= most, "mapped memory may not move");
         self.0.resize(most.max(self.0.len()), Page { _bytes: [0; 4096] });
         for (start, length) in mapped {
-            // SAFETY: whole pages, aligned as `Page` is, which live as long as the processor beside
-            // them and are not written.
+            // SAFETY: whole pages, aligned as `Page` is, which live as long as the processor that
+            // uses them and are not written.
             unsafe { processor.map(*start, *length, self.0.as_mut_ptr().cast(), false) };
         }
     }

@@ -72,7 +72,7 @@ impl Chromium {
             .args(graphics)
             .args(ARGUMENTS)
             .arg(format!("--user-data-dir={}", profile.display()))
-            // It keeps some of its state beside the profile otherwise.
+            // It keeps some of its state outside the profile otherwise.
             .env("HOME", &profile)
             .stdin(Stdio::null())
             .stdout(Stdio::null())

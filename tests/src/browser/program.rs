@@ -1,4 +1,4 @@
-//! The program under test: found beside the test, started, asked where its page is, and ended.
+//! The program under test: found next to the test, started, asked where its page is, and ended.
 
 use super::Error;
 use std::io::{BufRead, BufReader};

@@ -41,8 +41,8 @@ const NAK_WAIT: Nanos = 25_000;
 /// The period in which the interrupt endpoint is polled.
 const NOTIFY_EVERY: Nanos = 16 * MILLISECOND;
 
-/// The most endpoint 0 of a full-speed device may take at once, in bytes; what a host assumes until
-/// the first eight bytes of the device descriptor tell.
+/// The most endpoint 0 of a full-speed device may take at once, in bytes; a host assumes it until
+/// it has read the first eight bytes of the device descriptor.
 const CONTROL_PACKET: usize = 64;
 
 /// The wire time of a transaction with `bytes` of payload: 12 Mbit/s, three packets' overhead.

@@ -81,7 +81,7 @@ fn an_accelerometer_that_loses_its_power_alone_is_set_up_again() {
         rig.board.at_stop(|stopped| {
             let chip = stopped.tilt().expect("an accelerometer");
             chip.lose_power();
-            // Level from now on, which only a sensor that measures can tell.
+            // Level from now on, which only a sensor that measures can report.
             chip.set_milligravities([0, 0, 1_000]);
         });
         rig.pc.run_ms(&mut rig.board, 1_000);

@@ -46,7 +46,7 @@ struct Held {
     speed: f64,
     tick: u64,
     torque: f64,
-    /// The count stands still from now on, with both lines at one level.
+    /// The count is frozen from now on, with both lines at one level.
     dead: Option<i32>,
 }
 

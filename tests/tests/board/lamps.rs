@@ -1,4 +1,4 @@
-//! The boards' lamps tell the state to a person who sees no page.
+//! The boards' lamps show the state to a person who sees no page.
 
 use control_core::event::Fault;
 use link::Command;

@@ -51,7 +51,7 @@ fn spread(outputs: &[Output]) -> (Nanos, Nanos) {
     times.fold((u64::MAX, 0), |(low, high), time| (low.min(time), high.max(time)))
 }
 
-/// Every second of it is like every other but for the timing that is told once a second; the
+/// Every second of it is like every other except for the timing that is reported once a second; the
 /// nightly one waits for what is rare.
 #[test]
 fn a_flood_costs_no_tick_no_sample_and_no_time() {

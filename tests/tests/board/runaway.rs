@@ -65,7 +65,7 @@ fn tripped(rig: &mut Rig, cause: Fault) {
     tripped_by(rig, &[cause]);
 }
 
-/// One of `causes` was told within 60 ms.
+/// One of `causes` was reported within 60 ms.
 fn tripped_by(rig: &mut Rig, causes: &[Fault]) {
     rig.pc.run_ms(&mut rig.board, 60);
     let kinds: Vec<_> = rig.pc.heard.events.iter().map(|event| event.kind).collect();
@@ -152,8 +152,8 @@ fn an_encoder_unplugged_while_friction_is_rendered() {
     tripped(&mut rig, Fault::EncoderWire);
 }
 
-/// Its outputs are held at one level and do not float, so that no pull tells. A needle that is let
-/// go runs free meanwhile.
+/// Its outputs are held at one level and do not float, so that no pull reveals the loss. A needle
+/// that is let go runs free meanwhile.
 #[test]
 fn an_encoder_that_loses_its_power() {
     let supply_off = Wires { supply_off: true, ..Wires::default() };

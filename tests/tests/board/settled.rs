@@ -143,8 +143,8 @@ fn cogging_is_settled_on_the_flash_image() {
     let settled = settled(mechanism.plant(), 2, "settled");
     let cogging = settled.names.iter().find(|name| name.name == "cogging").expect("cogging is named");
     assert!(cogging.class.len() == 1 && cogging.confidence >= 0.9, "{cogging:?}");
-    // The mechanism has a weight, too, which the data sheet does not tell. At one tilt throughout
-    // it is a constant force: named or not, nobody may be told that nothing is missing.
+    // The mechanism has a weight, too, which the data sheet does not give. At one tilt throughout
+    // it is a constant force: named or not, the conclusion may not say that nothing is missing.
     let others: Vec<&str> = single(&settled).into_iter().filter(|name| *name != "cogging").collect();
     let is_told = settled.conclusion.contains("a further effect is missing");
     assert!(others == ["tilt_gravity"] || (others.is_empty() && is_told), "{}", settled.conclusion);

@@ -62,13 +62,13 @@ fn first_told(pc: &Pc, limit: Limits) -> Option<u64> {
     told(pc, limit)
 }
 
-/// The tick in which a limit was told first.
+/// The tick in which a limit was first reported.
 fn told(pc: &Pc, limit: Limits) -> Option<u64> {
     let tells = |kind: EventKind| matches!(kind, EventKind::Limits { in_force } if in_force.contains(limit));
     pc.heard.events.iter().find(|event| tells(event.kind)).map(|event| event.tick)
 }
 
-/// Torque of every tick from the start on, in mN·m, and whether the thermal limit was told.
+/// Torque of every tick from the start on, in mN·m, and true if the thermal limit was reported.
 fn hold_strong(continuous_mnm: f64) -> (Vec<f64>, bool) {
     const FULL_SCALE_MNM: f64 = 60.0;
     let mut config = stiff_wall();

@@ -1,7 +1,7 @@
 //! The page in a real browser: the main job as a person meets it, from the address that the program
 //! prints to the stop.
 //!
-//! One browser and one program, one step after the other, and no other test beside it
+//! One browser and one program, one step after the other, and no other test at the same time
 //! (`.config/nextest.toml`): two cores are not enough for several at once to keep 60 pictures a
 //! second. Writes what it measured to `target/page.json`.
 
@@ -26,7 +26,7 @@ const FEWEST_FPS: f64 = 50.0;
 /// any.
 const FPS_WINDOWS: usize = 20;
 /// Processor time of one picture over that of [`loop_time`], at most, on a machine that reaches
-/// fewer. Measured: 1.58 with 54 pictures a second, 1.63 with 17, beside four programs that do
+/// fewer. Measured: 1.58 with 54 pictures a second, 1.63 with 17 while four programs ran that do
 /// nothing but count.
 const MOST_LOOPS_A_PICTURE: f64 = 2.5;
 /// Steps of the hand that are timed: enough for a median.

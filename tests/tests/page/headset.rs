@@ -8,7 +8,7 @@ use tests::browser::{Chromium, Error, Page, Places, Program, check};
 
 /// A start on a busy machine.
 const SOME_TIME: Duration = Duration::from_secs(60);
-/// A headset that stands still, its eyes 64 mm apart.
+/// A headset that does not move, its eyes 64 mm apart.
 const EMULATE: &str = "{
     window.emulated = new IWER.XRDevice(IWER.metaQuest3, { stereoEnabled: true, ipd: 0.064 });
     emulated.installRuntime({ forceInstall: true });

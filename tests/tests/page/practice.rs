@@ -109,7 +109,7 @@ fn end_recording(page: &mut Page) -> Result<(), Error> {
     page.wait("no recording", SOON, "document.getElementById('recording').textContent === 'Not recording'")
 }
 
-/// Presses the button of a task, and waits until the program has told of it.
+/// Presses the button of a task, and waits until the program has reported it.
 fn task(page: &mut Page, name: &str) -> Result<(), Error> {
     let button = format!("document.querySelector('#tasks [data-task={name}]')");
     page.evaluate(&format!("{button}.click()"))?;
