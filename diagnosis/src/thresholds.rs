@@ -153,8 +153,8 @@ pub(crate) const LEAVES_SOMETHING: f64 = 2.0;
 /// says little there.
 pub(crate) const SUREST_BESIDE_PHYSICS: f64 = 0.8;
 /// Part of the force error from which a law goes into the plain selection, and the factor within
-/// which its sizes on held-out and on fitted recordings are: those of the regression that
-/// `prove --inject` sets beside the tool.
+/// which its sizes on held-out and on fitted recordings are: those of the regression with which
+/// `prove --inject` compares the tool.
 pub(crate) const PLAIN_SHARE: f64 = 0.05;
 pub(crate) const PLAIN_SAME_SIZE: f64 = 2.0;
 /// Part of the force error from which what a plain selection finds first contests the names of the
@@ -165,9 +165,10 @@ pub(crate) const CONTESTS: f64 = 0.15;
 /// recordings, from which an effect joins the regression: with two effects in the recordings the
 /// first alone takes little.
 pub(crate) const TAKEN_SHARE: f64 = 0.1;
-/// Part beside the others from which it is named. In 66 cases of effects concealed in both sets of
-/// machines (seed 36101) 20 to 35 % find as many of those concealed three times as strong as what
-/// the model leaves, and 20 % most of those as strong.
+/// Part of the force error, in addition to the other effects, from which an effect is named. In 66
+/// cases of effects concealed in both sets of machines (seed 36101) 20 to 35 % find as many of
+/// those concealed three times as strong as what the model leaves, and 20 % most of those as
+/// strong.
 pub(crate) const NAMED_SHARE: f64 = 0.2;
 /// Factors between its sizes on held-out and on fitted recordings: in 90 cases of seed 52302 two of
 /// the ten wrong names were outside.

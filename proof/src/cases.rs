@@ -1,5 +1,5 @@
 //! The list of cases of one run: every effect at three strengths, pairs, nulls, wrong values,
-//! physics without a name, and recordings that cannot tell.
+//! physics without a name, and recordings that do not suffice for a verdict.
 
 use crate::generator::effects::{EFFECTS, go_together};
 use crate::generator::excite::Kind;
@@ -21,7 +21,7 @@ fn draw_together(count: usize, rng: &mut Rng) -> Vec<&'static str> {
     names
 }
 
-/// Near twins with recordings that do not tell them apart.
+/// Near twins with recordings that do not distinguish them.
 const POOR: [(&str, &[Kind]); 10] = [
     ("command_delay", &[Kind::SlowMultisine]),
     ("electrical_lag", &[Kind::SlowMultisine]),

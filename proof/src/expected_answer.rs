@@ -1,6 +1,6 @@
-//! Real machines: nobody knows what is in them, so an answer is judged against what their sources
-//! say and least squares found. One line a case in `believed.tsv`; the rules stand in
-//! `docs/benchmark.md`.
+//! Real machines: nobody knows what is in them, so an answer is judged against the effects that
+//! their sources report and least squares found. `believed.tsv` has one line a case; the rules are
+//! in `docs/benchmark.md`.
 
 use crate::judge::Record;
 
@@ -9,7 +9,7 @@ use crate::judge::Record;
 pub(crate) struct ExpectedAnswer {
     /// The first name has to be one of these.
     right: Vec<String>,
-    /// May stand beside it, or alone.
+    /// Names that are accepted in addition to a right one, or alone.
     acceptable: Vec<String>,
     /// ExpectedAnswer and source, in words.
     pub(crate) source: String,

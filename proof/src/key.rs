@@ -21,7 +21,7 @@ pub(crate) enum Category {
     ParametersOnly,
     /// Physics that has no name: no name.
     Outside,
-    /// Recordings that cannot tell: a class with the truth in it, or no name.
+    /// Recordings that do not suffice for a verdict: a class with the truth in it, or no name.
     CannotTell,
 }
 

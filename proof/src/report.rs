@@ -1,5 +1,4 @@
-//! The honest table: what was wanted beside what was measured, on the terminal, as markdown and as
-//! JSON.
+//! The honest table: targets next to measured values, on the terminal, as markdown and as JSON.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;

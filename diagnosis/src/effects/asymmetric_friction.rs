@@ -1,6 +1,6 @@
 //! Friction that differs with direction: `-(viscous_difference·|q̇| + coulomb_difference·|sgn
-//! q̇|)`. Where the nominal model has an offset the dry part is that offset, and only the viscous
-//! part can be told.
+//! q̇|)`. If the nominal model has an offset, that offset is the dry part, and only the viscous
+//! part can be identified.
 
 use super::definition::{
     Allowed, EffectLaw, EffectReport, EffectSearch, FREE, Fitted, ForceLaw, Plain, Reported, Span,
@@ -51,8 +51,8 @@ impl EffectLaw for Defined {
         true
     }
     fn add_to_joint(&self, effect: &Effect, joint: &mut JointTerms) -> bool {
-        // Dry friction that differs with direction is a bias beside an even one, as long as the
-        // axis moves.
+        // As long as the axis moves, dry friction that differs with direction is a bias in addition
+        // to an even dry friction.
         joint.bias -= effect.coefficient("coulomb_difference");
         let difference = effect.coefficient("viscous_difference");
         if difference != 0.0 {

@@ -1,4 +1,4 @@
-//! Recordings that would tell effects apart, where more than one effect asks for the same.
+//! Recordings that would distinguish effects, where more than one effect asks for the same.
 
 /// At one speed, effects that depend on speed look like those that do not.
 pub(crate) const SPEEDS: &str = "a staircase of constant speeds over two decades, both ways";

@@ -1,6 +1,7 @@
-//! The laws of a plain regression, each on a few shapes, as one or two columns that stand where the
-//! drive's force stands: what the drive has to give more. They see a motion that was differentiated
-//! from the readings, and share nothing with the laws that the filter fits.
+//! The laws of a plain regression, each on a few shapes, as one or two columns on the same side of
+//! the equation as the drive's force: the additional force that the drive has to give. They see a
+//! motion that was differentiated from the readings, and share nothing with the laws that the
+//! filter fits.
 
 use super::EffectName as N;
 use std::f64::consts::TAU;

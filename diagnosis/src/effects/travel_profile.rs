@@ -7,7 +7,7 @@ use super::shape::shape;
 use super::{Effect, EffectName};
 
 /// Degrees of the polynomial that a profile along the travel may have: a slope or bend, a step or
-/// bump, and one that is narrow beside the travel.
+/// bump, and one that is narrow compared with the travel.
 const DEGREES: [f64; 3] = [3.0, 6.0, 12.0];
 
 shape! {

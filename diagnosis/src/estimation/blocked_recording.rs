@@ -122,7 +122,7 @@ impl BlockedRecording {
         self.motion.v[block] + slice.aside * (self.motion.v[other] - self.motion.v[block])
     }
 
-    /// Returns the input of an effective command; that of the command as sent where there is none.
+    /// Returns the input of an effective command; without one, that of the command as sent.
     pub(crate) fn drive(&self, effective: Option<&[f64]>) -> Input {
         effective.map_or_else(|| Input::clone(&self.rows.command_input), |command| self.rows.input(command))
     }

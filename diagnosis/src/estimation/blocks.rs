@@ -231,7 +231,7 @@ impl Blocks {
             let rows = row_time[first..end].iter().map(|t| t - start);
             self.reading_lag.push(LagStep::new(filter, span, rows));
         }
-        // Rows within one count tell no more than one of them.
+        // Rows within one count say no more than one of them.
         let moved = (counts[end - 1] - counts[first]).abs();
         self.quantum
             .push(scale * scale * (1.0 / 12.0 / (1.0 + moved.min(count - 1.0)) + noise * noise / count));

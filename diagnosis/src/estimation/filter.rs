@@ -2,9 +2,9 @@
 //! and, where the rig declares a filter in the reading, how far that lags.
 //!
 //! Innovations are linear in data and inputs, so a model that is linear in its coefficients becomes
-//! ordinary least squares on whitened innovations: weighted by what the sensor and the disturbance
-//! leave to be known, never differenced. Because an innovation only holds what the past did not
-//! tell, a command that reacts to a disturbance is not mistaken for its cause (prediction-error
+//! ordinary least squares on whitened innovations: weighted by the uncertainty that the sensor and
+//! the disturbance leave, never differenced. Because an innovation only holds what the past did not
+//! predict, a command that reacts to a disturbance is not mistaken for its cause (prediction-error
 //! identification in closed loop, Ljung 1999, chapter 13).
 
 use crate::estimation::covariance::{Gain, covariances, settling};

@@ -7,7 +7,7 @@ pub(crate) enum Input {
     Held(Vec<f64>),
     /// Change of velocity and position over the block and of the block's mean position.
     Rows { dv: Vec<f64>, dq: Vec<f64>, dz: Vec<f64> },
-    /// Travel that the encoder reads beside the position.
+    /// Travel that the encoder reads in addition to the position.
     Sensor(Vec<f64>),
 }
 

@@ -76,7 +76,7 @@ pub(crate) struct Whitened {
 #[derive(Debug, Clone, Default)]
 struct Inputs {
     of: Option<(BlockMotion, Arc<Rows>)>,
-    /// Each effect, the standing acceleration beside it, and its inputs; the last used first.
+    /// Each effect, the standing acceleration with it, and its inputs; the last used first.
     known: Vec<(Effect, f64, Arc<Vec<Input>>)>,
 }
 

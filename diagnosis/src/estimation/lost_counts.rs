@@ -31,7 +31,7 @@ const OVER_IMPACT: f64 = 1.3;
 /// Most jumps per recording, and the reach of a response in blocks.
 const MOST: usize = 80;
 const REACH: usize = 40;
-/// Fewest blocks after a jump that tell it from an impact.
+/// Fewest blocks after a jump that distinguish it from an impact.
 const FEWEST_AFTER: usize = 6;
 /// The number of passes over the residual: a large jump hides its neighbours.
 const ROUNDS: usize = 3;
@@ -40,11 +40,11 @@ const ROUNDS: usize = 3;
 pub(crate) struct Losses {
     /// Travel lost so far per block, rad or m; zero everywhere where too few jumps are seen.
     pub(crate) lost: Vec<f64>,
-    /// The price of the jump that begins in a block, nats. When counts get lost and how many nobody
-    /// can tell beforehand, so every jump is found in the very recording that it explains; less
-    /// this price its gain is at most what the recording is likelier where each block is as likely
-    /// to hold it and its size is drawn from a normal distribution of `spread` (Laplace's
-    /// approximation of the marginal likelihood), which noise cannot gain by on the mean.
+    /// The price of the jump that begins in a block, nats. Nobody knows beforehand when counts get
+    /// lost and how many, so every jump is found in the very recording that it explains. The gain
+    /// of a jump less this price is at most the gain in likelihood of the recording if each block
+    /// is as likely to hold the jump and its size is drawn from a normal distribution of `spread`
+    /// (Laplace's approximation of the marginal likelihood). Noise cannot gain by that on the mean.
     pub(crate) price: Vec<f64>,
     /// Sizes of the jumps, rad or m.
     pub(crate) sizes: Vec<f64>,
@@ -57,7 +57,7 @@ pub(crate) fn spread_of(sizes: &[f64], count: f64) -> f64 {
 }
 
 /// Finds the counts that a recording lost in the residual of a fit of it alone without jumps;
-/// `spread` is the size of jumps where other recordings tell, rad or m.
+/// `spread` is the size of jumps, rad or m, if other recordings show it.
 pub(crate) fn find(
     track: &BlockedRecording,
     alone: &Fit,
@@ -141,12 +141,12 @@ fn follows_angle(track: &BlockedRecording, jumps: &[Jump]) -> bool {
     travel > turn && sum(f64::cos).hypot(sum(f64::sin)) > FOLLOWS
 }
 
-/// A response after blocks in which there is none.
+/// A response that begins after a number of blocks that are zero.
 fn after(blocks: usize, response: Vec<f64>) -> Vec<f64> {
     [vec![0.0; blocks], response].concat()
 }
 
-/// Blocks at which a jump of the reading stands out, the clearest first.
+/// Blocks at which the reading clearly jumps, the clearest first.
 fn peaks(track: &BlockedRecording, gains: &Gains, residual: &[f64], least_gain: f64) -> Vec<(usize, Pair)> {
     let observed = track.observed();
     let mut found: Vec<(usize, Pair)> = Vec::new();
@@ -254,8 +254,8 @@ impl Jump {
     }
 }
 
-/// Fits all sizes at once, looks again where within its block each jump is, drops those that do not
-/// stand, and fits again; gives the rest of the residual.
+/// Fits all sizes at once, looks again where within its block each jump is, drops those that are
+/// not confirmed, and fits again; gives the rest of the residual.
 fn settle(jumps: &mut Vec<Jump>, residual: &[f64], stands: impl Fn(&Jump) -> bool) -> Vec<f64> {
     let left = fit_sizes(jumps, residual);
     for jump in jumps.iter_mut() {

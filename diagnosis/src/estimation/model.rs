@@ -26,7 +26,7 @@ pub(crate) struct Column {
 pub(crate) struct Model {
     pub(crate) effects: Vec<Effect>,
     /// Acceleration by the force that is there all the time, for a second mass to take up, per
-    /// fitted recording; where there is none the track's own.
+    /// fitted recording; without an entry, the track's own.
     pub(crate) bias: Vec<f64>,
 }
 

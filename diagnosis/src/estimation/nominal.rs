@@ -220,8 +220,8 @@ impl Nominal {
         taken > self.most_ignored() * whole
     }
 
-    /// Deceleration that dry friction makes, as far as the rig tells; otherwise what is ordinary
-    /// for its drive.
+    /// Deceleration that dry friction makes, from the rig if it gives a dry friction; otherwise
+    /// what is ordinary for its drive.
     pub(crate) fn dry_deceleration(&self) -> f64 {
         let dry = self.rig.model.coulomb.filter(|x| *x > 0.0).unwrap_or(self.force_scale());
         dry / self.known_inertia()

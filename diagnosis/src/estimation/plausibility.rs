@@ -104,9 +104,9 @@ impl Smoothed {
         }
     }
 
-    /// The inertia for which the motion asks, with friction and a constant beside, and the part of
-    /// the force's variance that they explain; none where acceleration explains too little for its
-    /// scale to say anything.
+    /// The inertia for which the motion asks, fitted together with friction and a constant, and the
+    /// part of the force's variance that they explain; none where acceleration explains too little
+    /// for its scale to say anything.
     fn inertia(&self) -> Option<(f64, f64)> {
         let force = &self.force;
         let constant = vec![1.0; force.len()];
@@ -120,8 +120,8 @@ impl Smoothed {
         (all > 0.0 && by_acceleration > 0.3 * all).then(|| (factors[0], 1.0 - left / all))
     }
 
-    /// The inertia for which the motion asks if its angle is `unit` times as large, with friction,
-    /// gravity and a constant beside; none where that explains too little.
+    /// The inertia for which the motion asks if its angle is `unit` times as large, fitted together
+    /// with friction, gravity and a constant; none where that explains too little.
     fn inertia_in(&self, unit: f64) -> Option<f64> {
         let force = &self.force;
         let scaled = |column: &[f64]| column.iter().map(|x| unit * x).collect::<Vec<f64>>();

@@ -1,9 +1,9 @@
 //! A first-order filter in the reading that the rig declares: how far the reading lags behind the
 //! axis.
 //!
-//! With ℓ the position less its filtered reading, ℓ′ = v − ℓ/τ. It is a state of its own beside
-//! position and speed, so every force, linear or not, acts on the axis and only the reading is
-//! filtered.
+//! With ℓ the position less its filtered reading, ℓ′ = v − ℓ/τ. It is a state of its own in
+//! addition to position and speed, so every force, linear or not, acts on the axis and only the
+//! reading is filtered.
 
 /// The terms of the lag at some time in a block, per unit.
 #[derive(Debug, Clone, Copy, Default)]

@@ -76,7 +76,7 @@ const ONE_WAY: usize = 4;
 const DRIVEN: f64 = 10.0;
 
 /// Part of the dry friction that is not known in the block of a reversal, because the speeds of two
-/// blocks tell only roughly when the axis turns back. Set by hand: a tenth of a block too early or
+/// blocks show only roughly when the axis turns back. Set by hand: a tenth of a block too early or
 /// too late changes the mean friction by twice that part.
 const UNSURE: f64 = 0.2;
 
@@ -108,8 +108,8 @@ fn swept(v: &[f64], holds: &[bool], floor: f64, by_friction: f64) -> Vec<bool> {
     out
 }
 
-/// Blocks beside one that is `slow` or beside a change of the sign of the speed `v`, but for what
-/// is `swept`.
+/// Blocks next to one that is `slow` or next to a change of the sign of the speed `v`, except those
+/// that are `swept`.
 fn near_rest(v: &[f64], slow: &[bool], swept: &[bool]) -> Vec<bool> {
     let n = v.len();
     let is_beside = |j: usize| {

@@ -90,7 +90,7 @@ fn columns_of(track: &BlockedRecording, effect: &Effect, law: &mut Law, command:
     columns
 }
 
-/// True if a law reads the command beside the motion.
+/// True if a law reads the command in addition to the motion.
 fn uses_command(effect: &Effect) -> bool {
     let over_command = effect.table.as_ref().is_some_and(|table| table.over.contains(&Variable::Command))
         || effect.name.formula().is_some_and(|formula| formula.uses("u"));

@@ -57,8 +57,8 @@ struct Skew {
     fit: Fit,
 }
 
-/// Finds the skew beside a model by fitting it and shifting the commands in turn; none where it is
-/// more than a row or adds less than [`SEEN`] to the log-likelihood `without` it.
+/// Finds the skew on top of a model by fitting it and shifting the commands in turn; none where it
+/// is more than a row or adds less than [`SEEN`] to the log-likelihood `without` it.
 fn find(
     model: &Model,
     nominal: &Nominal,
@@ -123,9 +123,9 @@ pub(crate) fn settle(nominal: &mut Nominal, tracks: &mut [BlockedRecording], noi
     }
 }
 
-/// Returns the skew, in rows, that an effect of a model stands for, or that takes most of what the
-/// model leaves: missing effects may hide a skew until they are in the model. None where the
-/// nominal model allows for a skew already.
+/// Returns the skew, in rows, that an effect of a model represents, or that takes most of the
+/// residual of the model: missing effects may hide a skew until they are in the model. None where
+/// the nominal model allows for a skew already.
 pub(crate) fn beside(
     model: &Model,
     nominal: &Nominal,

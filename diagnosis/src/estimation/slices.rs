@@ -1,5 +1,5 @@
 //! Rows of a block taken together, for laws that are faster than a block and slower than a row.
-//! They hold time stamps as they stand and nothing of what a law makes of them.
+//! They hold time stamps unchanged and nothing of what a law makes of them.
 
 use crate::estimation::input::Input;
 use std::ops::Range;

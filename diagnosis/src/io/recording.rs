@@ -181,8 +181,8 @@ impl Recording {
         })
     }
 
-    /// The recording without long rests at its ends, in which nothing can be told, and how much was
-    /// taken from its start, s.
+    /// The recording without long rests at its ends, which carry no information, and the time that
+    /// was taken from its start, s.
     pub(crate) fn without_idle_ends(&self) -> (Cow<'_, Self>, f64) {
         let n = self.len();
         let counts = &self.position_counts;

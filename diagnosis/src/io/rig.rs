@@ -150,7 +150,7 @@ pub struct Rig {
     pub actuator: Actuator,
     /// The encoder.
     pub encoder: Encoder,
-    /// Effects beside the nominal model; in a patched rig only.
+    /// Effects in addition to the nominal model; in a patched rig only.
     #[serde(default, rename = "effect", skip_serializing_if = "Vec::is_empty")]
     pub effects: Vec<Effect>,
     /// Formulas that are searched too.

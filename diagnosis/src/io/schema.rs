@@ -18,7 +18,7 @@ pub enum Verdict {
     Unexplained,
     /// A mismatch that does not repeat and depends on nothing recorded.
     RandomDisturbance,
-    /// These recordings cannot tell.
+    /// These recordings do not suffice for a verdict.
     InsufficientExcitation,
 }
 
@@ -29,12 +29,12 @@ pub struct Parameter {
     pub value: f64,
     /// 95 % interval.
     pub ci95: [f64; 2],
-    /// The unit; "1" where there is none.
+    /// The unit; "1" for a number without a unit.
     pub unit: String,
 }
 
 impl Parameter {
-    /// The unit as people read it: nothing where there is none.
+    /// The unit as people read it: empty for a number without a unit.
     pub(crate) fn unit_in_words(&self) -> &str {
         if self.unit == "1" { "" } else { &self.unit }
     }
@@ -74,7 +74,7 @@ pub struct Place {
 pub struct Named {
     /// Its name.
     pub name: EffectName,
-    /// Every effect that the data cannot tell from it, itself included.
+    /// Every effect that the data cannot distinguish from it, itself included.
     pub class: Vec<EffectName>,
     /// Returns the subsystem that it belongs to.
     pub subsystem: Subsystem,
@@ -177,8 +177,8 @@ pub struct Hypothesis {
     /// search.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub evidence: Option<BTreeMap<String, f64>>,
-    /// Every effect that the data cannot tell from it, itself included; only where it came through
-    /// the search.
+    /// Every effect that the data cannot distinguish from it, itself included; only where it came
+    /// through the search.
     #[serde(skip_serializing_if = "Vec::is_empty", default)]
     pub class: Vec<EffectName>,
     /// The reason why it was rejected; absent if it was named.
@@ -191,7 +191,7 @@ pub struct Hypothesis {
 pub struct Contending {
     /// The effect; none for the model without it.
     pub name: Option<EffectName>,
-    /// Probability as far as these recordings tell, 0 to 1.
+    /// Probability as far as these recordings show, 0 to 1.
     pub probability: f64,
     /// The rig's file, from the report's folder.
     pub rig: String,
@@ -275,10 +275,10 @@ pub struct Report {
     /// The place of the mismatch, if nothing was named.
     #[serde(rename = "where", skip_serializing_if = "Option::is_none", default)]
     pub place: Option<Place>,
-    /// The recording to make next, when the recordings cannot tell.
+    /// The recording to make next, if the recordings do not suffice for a verdict.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub separating_experiment: Option<String>,
-    /// The three models run forward beside the held-out recordings.
+    /// The three models run forward and compared with the held-out recordings.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub simulation: Option<Simulation>,
     /// The reason why the recordings cannot decide, or the residual if no effect is named.

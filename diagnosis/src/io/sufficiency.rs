@@ -19,8 +19,8 @@ const NOBODYS_HZ: f64 = 2.0;
 /// Fewest counts of travel.
 const FEWEST_COUNTS: f64 = 100.0;
 
-/// The reason why recordings cannot tell, if there is one; short ones tell together what none tells
-/// alone.
+/// The reason why recordings do not suffice for a verdict, if there is one; short recordings may
+/// suffice together although each is too short by itself.
 pub(crate) fn too_little(fit: &[Recording], holdout: &[Recording]) -> Option<String> {
     if let Some(reason) = fit.iter().chain(holdout).find_map(alone) {
         let enough = fit.iter().chain(holdout).filter(|recording| alone(recording).is_none());
@@ -54,7 +54,7 @@ pub(crate) fn with_usable(sentence: String, usable: &[&str]) -> String {
     }
 }
 
-/// The reason why one recording tells too little.
+/// The reason why one recording does not suffice.
 fn alone(recording: &Recording) -> Option<String> {
     let file = &recording.file;
     let seconds = recording.duration_s();

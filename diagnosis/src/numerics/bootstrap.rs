@@ -33,7 +33,7 @@ pub(crate) struct Gain {
 const RESAMPLED: usize = 400;
 /// Largest gain that one block counts with, in log-likelihood.
 const WITNESS: f64 = 10.0;
-/// Standard errors that stand for a gain without any spread.
+/// Standard errors that are reported for a gain without any spread.
 const SUREST: f64 = 100.0;
 /// Neighbouring segments that are taken together.
 const TOGETHER: usize = 3;

@@ -36,8 +36,8 @@ pub(crate) struct Assessment {
     pub(crate) named_alone: Option<Shown>,
     /// The gain of a force of any form in addition to the named effects.
     pub(crate) beside: Option<FreeFormShare>,
-    /// The force of any form that explains most, where nothing is named, and the refit with it
-    /// beside.
+    /// The force of any form that explains most, where nothing is named, and the refit with that
+    /// force included.
     pub(crate) unnamed: Option<Unnamed>,
     pub(crate) with_unnamed: Option<Shown>,
     /// Physics without a name that explains most, where nothing is named.

@@ -61,8 +61,8 @@ pub(crate) fn by_shares(prepared: &Prepared, found: &Found) -> ByShares {
     let own: &[Effect] = &found.standing.model.model.effects;
     let grown = selection.grown(TAKEN_SHARE, own);
     let all: Vec<&Effect> = grown.iter().map(|law| &law.effect).collect();
-    // The filter's band may be wider than the regression's: what is little beside the noise in one
-    // may be all there is in the other.
+    // The filter's band may be wider than the regression's: a force that is small next to the noise
+    // in one may be all there is in the other.
     if regime == Regime::Noise && !leaves_clearly_less(&all, own, &selection) {
         return ByShares::Nothing;
     }
@@ -97,9 +97,9 @@ pub(crate) fn by_shares(prepared: &Prepared, found: &Found) -> ByShares {
     }
 }
 
-/// True if shares can confirm an effect that was found next to noise. The forms of the command,
-/// which speak against its laws there, are none that a regression tries, so it has to take most of
-/// the force error.
+/// True if shares can confirm an effect that was found next to noise. A regression does not try the
+/// forms of the command, which speak against laws of the command next to noise, so such an effect
+/// has to take most of the force error.
 fn may_confirm(effect: &Effect, selected: &Selected) -> bool {
     !is_by_command(effect) || (CommandLaw::new(effect).is_none() && selected.share.least() >= MOST_SHARE)
 }
@@ -126,7 +126,7 @@ fn explains_more(selected: &[Selected], own: &[Effect], selection: &Selection) -
 }
 
 /// True if effects leave clearly less of the force than what was found. A law that reshapes the
-/// command may stand for what is new, which then has to be most of the rest.
+/// command may stand for the new effects, which then have to be most of the rest.
 fn leaves_clearly_less(effects: &[&Effect], own: &[Effect], selection: &Selection) -> bool {
     let reshapes = |effect: &Effect| CommandLaw::new(effect).is_some();
     let has_law = |effect: &&Effect| !reshapes(effect) || selection.judges(std::slice::from_ref(*effect));
@@ -198,8 +198,8 @@ fn is_found_closer(prepared: &Prepared, found: &Found, selected: &Found, selecti
     is_judged && left(found, &again) < CLEARLY_LESS * left(selected, &selected.standing.model)
 }
 
-/// The effects that were selected, with those found that stand beside them; and those found that do
-/// not.
+/// The effects that were selected, together with the found effects that are material in addition to
+/// them; and the found effects that are immaterial.
 fn beside(
     found: &Found,
     materials: &[Material],
@@ -222,7 +222,8 @@ fn beside(
     (effects, rejected)
 }
 
-/// A class with a name of it first, and then those that no such recordings tell from it.
+/// A class that begins with a name of it, followed by the effects that no such recordings
+/// distinguish from that name.
 pub(super) fn class_of(name: EffectName, twins: Vec<EffectName>, near: Vec<EffectName>) -> Vec<EffectName> {
     let mut class = vec![name];
     for other in twins.into_iter().chain(near) {
@@ -247,7 +248,7 @@ pub(crate) fn confirmed(mut found: Found, materials: Vec<Material>) -> Found {
 pub(super) enum Regime {
     /// Noise, before anything was found.
     Noise,
-    /// Noise, beside what was found.
+    /// Noise, in addition to what was found.
     Explained,
     /// Other physics.
     Physics,
@@ -266,8 +267,8 @@ impl Regime {
     }
 }
 
-/// Returns why an effect that the search found does not stand beside those selected; none where a
-/// regression cannot judge it, or it takes a material part.
+/// Returns why an effect that the search found is not kept in addition to those selected; none
+/// where a regression cannot judge it, or it takes a material part.
 fn immaterial(effect: &Effect, selected: &[Selected], selection: &Selection) -> Option<Rejection> {
     let is_clip = matches!(CommandLaw::new(effect), Some(CommandLaw::Clip { .. }));
     if effect.name.definition().coupling().is_some() || is_clip {

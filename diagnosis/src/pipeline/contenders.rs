@@ -1,5 +1,5 @@
 //! The models that still contend for a name: each is a whole rig, fitted to the recordings, that an
-//! experiment can tell from the others.
+//! experiment can distinguish from the others.
 
 use super::assess::Assessment;
 use super::diagnosis::Contender;
@@ -112,7 +112,7 @@ impl Field<'_> {
         out
     }
 
-    /// The best shape of an effect beside a model.
+    /// The best shape of an effect that is added to a model.
     fn best_shape(&self, base: &Model, name: EffectName) -> Option<Effect> {
         let base = self.fitted(base.clone());
         self.context.screen(&base, &|other| other == name).into_iter().next().map(|(effect, _)| effect)

@@ -16,18 +16,19 @@ use std::collections::BTreeMap;
 
 /// The result of the stages.
 pub(crate) enum Diagnosis {
-    /// The recordings cannot tell, and nothing was named.
+    /// The recordings do not suffice for a verdict, and nothing was named.
     CannotTell {
         rig: Box<Rig>,
         reason: Reason,
         /// Rows a second of the slowest recording, where the recordings were looked at.
         rate_hz: Option<f64>,
     },
-    /// The recordings could tell.
+    /// The recordings sufficed for a verdict.
     Complete(Box<Complete>),
 }
 
-/// Why recordings cannot tell, or the residual where no effect is named.
+/// The reason why recordings do not suffice for a verdict, or the residual where no effect is
+/// named.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Reason {
     /// Something is wrong with the recordings, or they are too short: a sentence from where it was
@@ -62,7 +63,7 @@ pub(crate) struct Moved {
     pub(crate) deviations: f64,
 }
 
-/// A diagnosis of recordings that could tell.
+/// A diagnosis of recordings that sufficed for a verdict.
 pub(crate) struct Complete {
     pub(crate) verdict: Verdict,
     pub(crate) reason: Option<Reason>,
@@ -91,7 +92,8 @@ pub(crate) struct Complete {
     pub(crate) free_form: Option<FreeForce>,
     /// Travel that is to be recorded to fit on.
     pub(crate) beyond_fitted: Option<BeyondFitted>,
-    /// The models run forward beside the held-out recordings, and their errors over all of them.
+    /// The models run forward and compared with the held-out recordings, and their errors over all
+    /// of them.
     pub(crate) simulated: Vec<Comparison>,
     pub(crate) simulation: Option<Simulation>,
     /// Residuals of every recording, fitted ones first.
@@ -116,7 +118,7 @@ pub(crate) struct Rigs {
 /// An effect that is named.
 pub(crate) struct NamedEffect {
     pub(crate) name: EffectName,
-    /// Every effect that the data cannot tell from it, itself first.
+    /// Every effect that the data cannot distinguish from it, itself first.
     pub(crate) class: Vec<EffectName>,
     pub(crate) confidence: f64,
     pub(crate) parameters: BTreeMap<String, Parameter>,
@@ -139,7 +141,7 @@ pub(crate) struct JudgedHypothesis {
 pub(crate) struct Contender {
     /// The effect; none for the model without it.
     pub(crate) name: Option<EffectName>,
-    /// Probability as far as these recordings tell.
+    /// Probability as far as these recordings show.
     pub(crate) probability: f64,
     /// The whole machine with it, fitted.
     pub(crate) rig: Rig,

@@ -1,11 +1,11 @@
 //! The stages of a diagnosis, one after another: this folder alone sequences them.
 //!
 //! [`prepare`] cuts rig and recordings into blocks and refits the nominal model; [`search`] adds
-//! and removes effects, [`reshaped_command`] those that only shrink the command;
-//! [`by_shares`] selects them by shares of the force error where other physics
-//! and not noise limits; [`assess`] weighs those that stand; [`decide`] names them, or says why
-//! nothing is named. Each stage is one function that takes what the one before it returns, and
-//! changes none of it. What comes out is a [`diagnosis::Diagnosis`].
+//! and removes effects, [`reshaped_command`] those that only shrink the command; [`by_shares`]
+//! selects them by shares of the force error where other physics and not noise limits; [`assess`]
+//! weighs those that remain; [`decide`] names them, or says why nothing is named. Each stage is one
+//! function that takes what the one before it returns, and changes none of it. The result is a
+//! [`diagnosis::Diagnosis`].
 
 mod assess;
 mod by_plain;
@@ -69,8 +69,8 @@ pub(crate) fn run(
     })
 }
 
-/// The skew between command and reading, in rows, that only shows beside the effects that were
-/// found or that one of them stands for.
+/// The skew between command and reading, in rows, that only shows once the effects that were found
+/// are in the model, or that one of them represents.
 fn skew_beside(prepared: &Prepared, found: &Found) -> Option<f64> {
     if prepared.nominal.virtual_inertia > 0.0 {
         return None;
@@ -114,7 +114,7 @@ fn by_selected(prepared: &Prepared, with: Found, alone: Option<Box<Found>>) -> O
         one.weighed.named().iter().filter(is_selected).count()
     };
     let with = assessed(with);
-    // What a regression cannot judge may stand where a selected effect would.
+    // An effect that a regression cannot judge may occupy the position of a selected one.
     let is_short = with.as_ref().is_none_or(|one| named(one) < all);
     let alone = alone.filter(|_| is_short).and_then(|alone| assessed(*alone));
     let best = match (with, alone) {

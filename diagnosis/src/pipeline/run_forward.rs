@@ -1,5 +1,5 @@
-//! The nominal, refitted and patched rig run forward beside the held-out recordings: what people
-//! mean by a simulation that fits.
+//! The nominal, refitted and patched rig run forward and compared with the held-out recordings:
+//! this is the usual meaning of a simulation that fits.
 
 use crate::io::recording::Recording;
 use crate::io::rig::Rig;
@@ -7,10 +7,11 @@ use crate::io::schema::{ByModel, Simulation, WindowsOff};
 use crate::simulation::comparison::{Comparison, Figures};
 use crate::thresholds::WORSE_MOTION;
 
-/// Windows that the report tells of, s.
+/// Windows for which the report gives errors, s.
 const WINDOWS_S: [f64; 3] = [0.1, 0.5, 2.0];
 
-/// The models beside every held-out recording; the patched one only where something was found.
+/// The models compared with every held-out recording; the patched one only where something was
+/// found.
 pub(crate) fn simulated(nominal: &Rig, refit: &Rig, patched: &Rig, holdout: &[Recording]) -> Vec<Comparison> {
     let mut models = vec![("nominal".to_owned(), nominal.clone()), ("refit".to_owned(), refit.clone())];
     if patched.effects.len() > nominal.effects.len() {

@@ -1,5 +1,5 @@
-//! The second stage: effects are added one after another as long as one generalises, and what does
-//! not stand when all are judged together is taken out again.
+//! The second stage: effects are added one after another as long as one generalises, and those that
+//! are rejected when all are judged together are taken out again.
 
 use super::Progress;
 use super::prepare::Prepared;
@@ -94,8 +94,8 @@ struct Tried {
 /// The model with one more effect.
 struct Next {
     state: SearchState,
-    /// True if the effect generalises to the held-out recordings; otherwise it is likely to beside
-    /// another.
+    /// True if the effect generalises to the held-out recordings; otherwise it is likely to
+    /// generalise together with another effect.
     generalises: bool,
 }
 
@@ -211,7 +211,7 @@ impl Search<'_> {
     }
 
     /// Judges a model with one more effect; where it is rejected and `may_promise`, it is kept if
-    /// it may carry beside another.
+    /// it may generalise together with another effect.
     fn judge(&self, now: &SearchState, finalist: FittedModel, may_promise: bool) -> Judged {
         let on = self.context(&now.tracks);
         let with = on.fit_slow(finalist.model.clone(), &[&now.slow.noise, &finalist.noise]);
@@ -242,8 +242,8 @@ impl Search<'_> {
         }
     }
 
-    /// The model with the best set of plain forces, where they gain enough beside `best`, the most
-    /// that any effect gains, and all of them generalise.
+    /// The model with the best set of plain forces, where they gain enough compared with `best`,
+    /// the most that any effect gains, and all of them generalise.
     fn with_plain_forces(&self, now: &SearchState, best: f64) -> Option<Next> {
         let on = self.context(&now.tracks);
         for white in best_plain_models(&on, now) {
@@ -276,7 +276,7 @@ enum Judged {
         /// Gain on held-out recordings, nats; none where it was not judged there.
         holdout_gain: Option<f64>,
         why: Rejection,
-        /// The model, where the effect may carry beside another.
+        /// The model, where the effect may generalise together with another effect.
         provisional: Option<SearchState>,
     },
 }

@@ -16,7 +16,7 @@ use crate::validation::weighed_model::WeighedModel;
 /// Part of the force that must be left, on every recording, to say that the rig's model does not
 /// speak of these recordings.
 const FOREIGN: f64 = 0.85;
-/// Part of the force that a disturbance must make up before it is called one, beside the noise.
+/// Part of the force, above the noise, that a disturbance must make up before it is called one.
 const DISTURBED: f64 = 0.05;
 /// Part of the refit's mean square that doubtful effects must leave at most for the mismatch to be
 /// called repeatable.

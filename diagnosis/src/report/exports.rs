@@ -97,7 +97,7 @@ fn joint_of(rig: &Rig) -> JointTerms {
     joint
 }
 
-/// Text that may stand in XML, and in its comments.
+/// Text that is valid in XML, and in its comments.
 fn xml(text: &str) -> String {
     html_report::safe(text).replace("--", "– ")
 }

@@ -44,7 +44,7 @@ pub(crate) fn page(outcome: &Outcome) -> String {
     simulation_page::whole(&format!("Diagnosis: {}", outcome.evidence.rig), &out)
 }
 
-/// The motion that the simulation gives beside the one that was recorded.
+/// The motion that the simulation gives, next to the one that was recorded.
 fn motion(out: &mut String, outcome: &Outcome) {
     let Some(first) = outcome.evidence.simulated.first() else { return };
     let _ = write!(out, "<section><h2>Simulated and recorded: {}, held out</h2>", safe(&first.file));

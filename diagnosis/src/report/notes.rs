@@ -3,10 +3,10 @@
 
 use crate::pipeline::diagnosis::Moved;
 
-/// Standard deviations from which a value far from the rig's is told.
+/// Standard deviations from the rig's value at which a value is reported as far from it.
 const FAR: f64 = 2.0;
-/// Rows by which commands act early or late from which that is told: a hundredth is the last digit
-/// shown.
+/// Rows by which commands act early or late at which that is reported: a hundredth is the last
+/// digit shown.
 const SKEWED: f64 = 0.005;
 
 /// The notes, each a clause.

@@ -21,7 +21,7 @@ pub struct Evidence {
     pub series: Vec<Series>,
     /// Residuals of the patched model over states.
     pub maps: Vec<Map>,
-    /// The models run forward beside the held-out recordings.
+    /// The models run forward and compared with the held-out recordings.
     pub simulated: Vec<Comparison>,
     /// The force of any form, where nothing is named.
     pub(crate) form: Option<Shape>,
@@ -167,7 +167,7 @@ impl Outcome {
         }
     }
 
-    /// The outcome where recordings cannot tell, with the reason.
+    /// The outcome if recordings do not suffice for a verdict, with the reason.
     pub(crate) fn cannot_tell(rig: &Rig, reason: &Reason, rate_hz: Option<f64>) -> Self {
         let mut report = Report {
             format: 1,

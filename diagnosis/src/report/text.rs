@@ -144,8 +144,8 @@ pub(crate) fn not_tested(why: &NotTested, unit: &str) -> String {
     }
 }
 
-/// Why recordings cannot tell, or the residual where no effect is named; `form` is the force of any
-/// form, in words, where there is one.
+/// The reason why recordings do not suffice for a verdict, or the residual where no effect is
+/// named; `form` is the force of any form, in words, where there is one.
 pub(crate) fn reason(why: &Reason, form: Option<&str>) -> String {
     let sentence = match why {
         Reason::Recordings(sentence) => sentence.clone(),

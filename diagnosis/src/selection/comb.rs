@@ -28,7 +28,7 @@ pub(crate) fn is_comb(effect: &Effect, amplitudes: &[f64]) -> bool {
     waves.sort_by(f64::total_cmp);
     let Some(longest_wave) = waves.first() else { return true };
     let first = effect.turn().map_or(*longest_wave, |turn| TAU / turn);
-    // Where no turn is known waves may stand closer than the longest allows teeth to.
+    // If no turn is known, waves may be closer together than teeth can be, given the longest wave.
     let orders: Vec<f64> = waves.iter().map(|wave| (wave / first).round()).collect();
     let mut run = 1;
     let mut longest = 1;
@@ -72,7 +72,7 @@ mod tests {
         assert!(is_comb(&free(&[2.5e-3, 1.25e-3, 0.83e-3]), &[1.0; 3]));
         assert!(is_comb(&free(&[2.5e-3, 1.25e-3, 0.83e-3, 0.625e-3]), &[1.0; 4]));
         assert!(!is_comb(&free(&[0.0754, 0.0522, 0.0456, 0.0370]), &[0.79, 1.07, 0.56, 0.35]));
-        // What is weak beside the strongest does not close a gap.
+        // A wave that is weak compared with the strongest does not close a gap.
         assert!(is_comb(&cogging(&[2.0, 3.0, 4.0, 5.0, 6.0]), &[1.0, 1.0, 0.1, 1.0, 1.0]));
     }
 }

@@ -25,7 +25,7 @@ const ONE_TURN: f64 = 1.0;
 /// Shortest stroke, counts: less is a tremor.
 const STROKE_COUNTS: f64 = 4.0;
 
-/// Upper over lower quantile of positive values; infinite where there are none.
+/// Upper over lower quantile of positive values; infinite without any value.
 fn ratio(mut values: Vec<f64>, part: f64) -> f64 {
     values.sort_by(f64::total_cmp);
     let Some(last) = values.len().checked_sub(1) else { return f64::INFINITY };

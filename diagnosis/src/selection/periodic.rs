@@ -1,5 +1,5 @@
-//! Periodic effects: which orders of a turn, or which period along the travel, stand out of the
-//! residual.
+//! Periodic effects: finds the orders of a turn, or the period along the travel, that are
+//! significant in the residual.
 
 use crate::effects::definition::Span;
 use crate::effects::{Effect, EffectName as N};
@@ -25,7 +25,7 @@ const MOST: usize = 14;
 const MOST_CYCLES: f64 = 480.0;
 /// Fewest half cycles over the travel where no turn is known: less is a shape along the travel.
 const FEWEST: usize = 6;
-/// Gain of log-likelihood that a further order must bring, beside one for the orders looked
+/// Gain of log-likelihood that a further order must bring, in addition to one for the orders looked
 /// through.
 const PER_ORDER: f64 = 8.0;
 
@@ -39,7 +39,7 @@ pub(crate) fn fits(order: f64, turns: f64) -> bool {
     order * turns >= PERIODS || (order == 1.0 && turns > MOST_OF_TURN)
 }
 
-/// True if a travel, in turns, tells two orders from each other: their beat must go round once.
+/// True if a travel, in turns, distinguishes two orders: their beat must go round once.
 pub(crate) fn are_apart(a: f64, b: f64, turns: f64) -> bool {
     (a - b).abs() * turns >= 1.0
 }
@@ -258,7 +258,7 @@ fn gains_on_ladder(searches: &[&Waves], orders: &[f64]) -> Vec<Vec<f64>> {
 }
 
 /// Finds the orders of cogging or torque ripple, each effect for itself, in the residual of a fit;
-/// the gain counts every recording's own phases. Effects without any order that stands out are left
+/// the gain counts every recording's own phases. Effects without any significant order are left
 /// out.
 pub(crate) fn search(names: &[N], context: &FitContext, searched: &Searched) -> Vec<(Effect, f64)> {
     let waves: Vec<(N, Waves)> =
@@ -276,7 +276,7 @@ fn gain_of(sums: &Sums) -> f64 {
 }
 
 /// Picks orders one after another while each brings more than it costs; `may_join` says which may
-/// stand beside those chosen.
+/// join those chosen.
 fn forward(
     sums: &Sums,
     orders: usize,

@@ -10,8 +10,8 @@ use crate::numerics::linear::{Prior, bounded};
 
 /// Parts that segments are dealt into.
 pub(crate) const FOLDS: usize = 6;
-/// Neighbouring segments that are left out together: what a disturbance remembers must not tell of
-/// the block that is judged.
+/// Neighbouring segments that are left out together: a disturbance lasts, and its neighbours must
+/// not give information on the block that is judged.
 const TOGETHER: usize = 3;
 
 /// The fold in which a segment of a recording is left out.

@@ -50,7 +50,8 @@ fn along(
 }
 
 impl FitContext<'_> {
-    /// The wanted effects that are not in a model yet and that these recordings may show beside it.
+    /// The wanted effects that are not in a model yet and that these recordings may show in
+    /// addition to it.
     pub(crate) fn that_may_be_added(&self, model: &Model, wanted: &dyn Fn(N) -> bool) -> Vec<N> {
         let is_dry = |e: &Effect| e.name.definition().nominal_term() == Some(NominalTerm::Coulomb);
         let dry = self.nominal.has(NominalTerm::Coulomb) || model.effects.iter().any(is_dry);

@@ -1,4 +1,5 @@
-//! Several models of one machine beside one recording: what each is off, and the motions to draw.
+//! Compares several models of one machine with one recording: the error of each, and the motions to
+//! draw.
 
 use super::replay::{Beside, Deviation, Trajectory};
 use super::{Motion, PositionLoop};
@@ -7,7 +8,7 @@ use crate::io::rig::{Kind, Rig};
 use crate::numerics::parallel;
 use serde::Serialize;
 
-/// One model beside a recording.
+/// One model compared with a recording.
 #[derive(Debug, Clone)]
 pub struct Simulated {
     /// Its name: nominal, refit, patched and so on.
@@ -64,7 +65,7 @@ pub struct Window {
     pub off: Off,
 }
 
-/// Models beside a recording.
+/// Models compared with a recording.
 #[derive(Debug, Clone)]
 pub struct Comparison {
     /// The recording's file name.
@@ -82,8 +83,8 @@ pub struct Comparison {
 }
 
 impl Comparison {
-    /// Runs every model beside a recording; the first names kind, resolution and inertia.
-    /// `windows` are lengths in s.
+    /// Runs every model and compares it with a recording; the first names kind, resolution and
+    /// inertia. `windows` are lengths in s.
     pub fn new(recording: &Recording, models: &[(String, Rig)], windows: &[f64]) -> Self {
         let Some((_, first)) = models.first() else {
             unreachable!("a comparison is asked for with at least one model")

@@ -1,5 +1,6 @@
-//! A rig beside a recording: free run from the first row, windows started from the measured state,
-//! and under the recorded reference. The command is held from row to row, as the contract has it.
+//! Simulates a rig for comparison with a recording: free run from the first row, windows started
+//! from the measured state, and under the recorded reference. The command is held from row to row,
+//! as the contract has it.
 
 use super::{Motion, Plant, PositionLoop, Surroundings};
 use crate::io::recording::Recording;
@@ -56,7 +57,7 @@ impl Trajectory {
     }
 }
 
-/// A recording to simulate beside.
+/// A recording with which simulations are compared.
 #[derive(Debug)]
 pub struct Beside<'a> {
     /// The recording.

@@ -89,7 +89,7 @@ impl Contest<'_> {
         rivals
     }
 
-    /// One effect fitted beside the others of the model, with how far behind it is.
+    /// One effect fitted together with the others of the model, with how far behind it is.
     fn rival(&self, base: &Model, effect: &Effect) -> Rival {
         let Self { context, best, .. } = *self;
         let model = with(base, effect);
@@ -148,7 +148,7 @@ pub(crate) fn leader(found: &[EffectEvidence]) -> Option<(usize, Effect)> {
     best.map(|(i, rival)| (i, rival.effect.clone()))
 }
 
-/// Every effect that these recordings cannot tell from the one found, itself first.
+/// Every effect that these recordings cannot distinguish from the one found, itself first.
 pub(crate) fn class(
     found: &EffectEvidence,
     excitation: &Excitation,

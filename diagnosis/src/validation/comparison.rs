@@ -13,8 +13,8 @@ pub(crate) struct Shown {
     pub(crate) on_fit: Residuals,
     pub(crate) on_holdout: Residuals,
     pub(crate) table: FitTable,
-    /// True if the nominal values explain held-out recordings better than refitted ones, which then
-    /// stand for them.
+    /// True if the nominal values explain held-out recordings better than refitted ones; they are
+    /// then used instead.
     pub(crate) keeps_nominal: bool,
 }
 

@@ -15,14 +15,15 @@ use std::collections::BTreeMap;
 /// The evidence for and against a name, by key; logarithms are natural.
 pub(crate) type Evidence = BTreeMap<String, f64>;
 
-/// The residual that the search leaves beside the effect itself.
+/// The residual that the search leaves with the effect in the model.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Leftover {
     /// Root mean square of what hangs together over time and is not explained, over the force's.
     pub(crate) of_force: f64,
     /// Mean square that the patched model leaves over the refit's, both above what counting and a
-    /// white disturbance make, on fitted or on held-out recordings, whichever is less: what hangs
-    /// together beside an effect is its wrong law, or another effect.
+    /// white disturbance make, on fitted or on held-out recordings, whichever is less: if the
+    /// residual of a model with an effect hangs together, the law is wrong or there is another
+    /// effect.
     pub(crate) unexplained: f64,
 }
 

@@ -1,4 +1,4 @@
-//! The check of every name against forces of any form, which stand for what is not in the library.
+//! The check of every name against forces of any form, which represent physics outside the library.
 
 use crate::effects::{Effect, Variable};
 use crate::estimation::filter::Noise;
@@ -26,8 +26,8 @@ fn share(of_model: f64, taken: &Taken) -> f64 {
 }
 
 /// Compares every effect that would be named with forces of any form; an effect is not named if one
-/// of them explains the data without it. Gives the weighed model with what its effects would rather
-/// be, and what a form takes beside all names, if there are any.
+/// of them explains the data without it. Gives the weighed model with the forms that replace its
+/// effects, and the gain of a form in addition to all names, if there are any.
 pub(crate) fn check(
     mut weighed: WeighedModel,
     context: &FitContext,
@@ -70,9 +70,9 @@ pub(crate) struct Unnamed {
     pub(crate) holdout_gain: Option<f64>,
 }
 
-/// The force of any form that explains most of what a refit leaves, where that is sure and enough
-/// to be reported; with the refit that has the force beside it, except where each recording has its
-/// own place of it.
+/// The force of any form that explains most of the residual of a refit, where that is sure and
+/// enough to be reported; with the refit that includes the force, except where each recording has
+/// its own place of it.
 pub(crate) fn alone(
     context: &FitContext,
     refit: &FittedModel,

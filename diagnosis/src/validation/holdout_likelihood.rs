@@ -1,7 +1,7 @@
-//! Held-out recordings judge: coefficients stand as fitted, only what is each recording's own may
-//! move (its offset, and the encoder's zero, on which the phase of periodic effects rests). For
-//! likelihoods that is found on other stretches of the recording than those it judges, as it is on
-//! fitted recordings, so that no freedom on held-out rows speaks for an effect.
+//! Held-out recordings judge: coefficients stay as fitted, and only a recording's own values may
+//! change (its offset, and the encoder's zero, on which the phase of periodic effects rests). For
+//! likelihoods these values are found on other stretches of the recording than those it judges, as
+//! on fitted recordings, so that no freedom on held-out rows speaks for an effect.
 
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::filter::Noise;

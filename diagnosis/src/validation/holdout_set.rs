@@ -18,7 +18,7 @@ use std::borrow::Cow;
 #[derive(Debug, Clone, Default)]
 pub(crate) struct HoldoutSet {
     /// Each block's motion from the rows until then. Likelihood gains come from here: a smoother
-    /// knows the disturbance from which a force is to be told.
+    /// knows the disturbance from which a force is to be distinguished.
     pub(crate) filtered: Vec<BlockedRecording>,
     /// Each block's motion from all rows. Force errors come from here: where counts are coarse the
     /// error of a filtered speed would be most of them.

@@ -41,9 +41,9 @@ pub(crate) enum Rejection {
     Creeps { part: f64 },
     /// Something that has no name in the library explains it better.
     Rather(Rather),
-    /// A larger effect beside it is not in the library.
+    /// A larger effect in the same model is not in the library.
     BesideUnknown,
-    /// Another effect beside it is of the same joint and explains more.
+    /// Another effect in the same model is of the same joint and explains more.
     SameJoint { other: EffectName },
     /// Gain and friction change by the same part, as where the inertia changes.
     InertiaChanges,
@@ -56,7 +56,7 @@ pub(crate) enum Rejection {
     TakesOtherForce { on_fit: f64, on_holdout: f64 },
     /// The probability that it is right is too small.
     Improbable { probability: f64, weakness: Weakness },
-    /// The recordings cannot tell it from a named effect.
+    /// The recordings cannot distinguish it from a named effect.
     Indistinguishable { from: EffectName },
     /// The search finds more in others.
     LessInSearch,

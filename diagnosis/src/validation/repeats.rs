@@ -149,7 +149,8 @@ mod tests {
         };
         assert_eq!(repeats(vec![track(0.0, outside(3)), track(0.3, outside(9))]), None);
         assert_eq!(repeats(vec![track(0.0, of_motion)]), None, "one recording without periods");
-        // Where the motion itself is unlike, what the loop was asked to follow tells.
+        // If the motions differ, the reference that the loop was asked to follow shows the
+        // repetition.
         let asked = |late: f64, reads: fn(f64) -> f64| {
             let (mut track, left) = track(late, of_motion);
             let followed = |t: &f64| (0.9 * (t - late) * (t - late).abs().sqrt()).sin();

@@ -1,6 +1,6 @@
-//! The names of the first selection beside those of a plain one, where other physics and not noise
-//! limits: a name that only one of them gives is less sure, and where they differ on what takes
-//! most, either may be right.
+//! Compares the names of the first selection with those of a plain one, where other physics and not
+//! noise limits: a name that only one of them gives is less sure, and where they differ on the
+//! effect that takes most, either may be right.
 
 use crate::effects::EffectName;
 use crate::effects::definition::NominalTerm;
@@ -40,7 +40,7 @@ fn is_limited_by_physics(weighed: &WeighedModel) -> bool {
 struct Named {
     class: Vec<EffectName>,
     confidence: f64,
-    /// The effect that a plain selection finds and that another name already stands for.
+    /// The effect that a plain selection finds and that another name already represents.
     instead: Option<EffectName>,
 }
 
@@ -53,7 +53,7 @@ impl Named {
 /// Compares names, the surest first, with a plain selection.
 fn beside(names: &mut [Named], plain: &PlainSelection) {
     let first = plain.found.first();
-    // True once a name stands for what the plain selection found first.
+    // True once a name represents the first finding of the plain selection.
     let mut stands = first.is_some_and(|first| names.iter().any(|name| name.class.contains(&first.name)));
     for name in names {
         if plain.has_one_of(&name.class) || !plain.knows(&name.class) {

@@ -15,9 +15,9 @@ const OVERSAMPLED: f64 = 2.6;
 const FEWEST_CYCLES: f64 = 12.0;
 /// Most of the motion, as parts of its mean square, that may be at the frequency of a swing that
 /// does not follow it, for a light axis gives way to it, and that may be about as fast otherwise:
-/// what repeats with the motion swings too, at its frequency and multiples of it. Both grow, as far
-/// as `ROOM` times, with how little of the residual is left beside the swing, for what repeats with
-/// the motion leaves much.
+/// what repeats with the motion swings too, at its frequency and multiples of it. The smaller the
+/// part of the residual without the swing, the larger both are, up to `ROOM` times, because a force
+/// that repeats with the motion leaves a large residual.
 const GIVES_WAY: f64 = 0.06;
 const FAST_MOTION: f64 = 0.02;
 const ROOM: f64 = 4.0;

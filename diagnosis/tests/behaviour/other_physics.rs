@@ -1,5 +1,5 @@
-//! Effects beside physics without a name that is far above the noise: shares of the force error
-//! decide there.
+//! Effects together with physics without a name that is far above the noise: shares of the force
+//! error decide there.
 
 use crate::axis::{AXIS, BENCH, Machine, Taken, diagnosed, mixed, names, record, rig};
 use diagnosis::Outcome;

@@ -1,5 +1,5 @@
 //! Verdicts on recordings of a small simulator: nulls, wrong values, disturbance, effects, and
-//! input that cannot tell.
+//! input that does not suffice for a verdict.
 
 use crate::common::{self, Setup, record, rig};
 use diagnosis::effects::EffectName;

@@ -73,8 +73,8 @@ fn eulers_method_is_half_a_row_and_no_effect() {
     }
 }
 
-/// Until the effect is in the model, it hides most of what the skew leaves: a delay of 0.3 rows and
-/// slip were named beside it.
+/// Until the effect is in the model, it hides most of the residual of the skew: a delay of 0.3 rows
+/// and slip were named in addition to it.
 #[test]
 fn a_skew_beside_an_effect_is_no_second_effect() {
     let cogging = (Machine { cogging: 1.0, ..AXIS }, N::Cogging);

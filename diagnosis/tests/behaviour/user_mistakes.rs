@@ -135,7 +135,7 @@ fn a_recording_without_a_mistake_is_diagnosed() {
     assert_eq!(outcome.report.verdict, Verdict::NoMismatch, "{}", outcome.summary());
     let simulation = outcome.report.simulation.expect("the models are run forward");
     let free = simulation.free_run.nominal.expect("the nominal too");
-    // It starts from a speed that counts of 1.6 mrad tell.
+    // It starts from a speed that is known from counts of 1.6 mrad.
     assert!(free < 0.2, "the true model follows the motion: {free} rad");
 }
 

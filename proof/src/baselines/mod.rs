@@ -46,8 +46,8 @@ pub(crate) const BASELINES: [Baseline; 6] = [
     Baseline { name: "unstructured", names: false },
 ];
 
-/// The fit that has been told the whole structure, by the judge's inverse dynamics; none where
-/// there is nothing to gain, or the effect has no law with few enough numbers.
+/// The fit that is given the whole structure, by the judge's inverse dynamics; none where there is
+/// nothing to gain, or the effect has no law with few enough numbers.
 pub(crate) fn known_structure(bench: &Result<Bench, String>, key: &Key) -> Option<Opinion> {
     if !matches!(key.category, Category::Single | Category::Pair | Category::Triple) {
         return None;

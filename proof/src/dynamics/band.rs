@@ -54,7 +54,7 @@ impl Band {
         self.motion.time[self.motion.len() - 1] - self.skip_s
     }
 
-    /// Acceleration, speed, direction, weight and measured load, as they stand on the left-hand
+    /// Acceleration, speed, direction, weight and measured load, with their signs on the left-hand
     /// side of the equation.
     pub(super) fn nominal_columns(&self) -> Vec<Vec<f64>> {
         let m = &self.motion;
@@ -74,7 +74,7 @@ impl Band {
     }
 }
 
-/// Time after a rest or a reversal in which the filters still tell of it, and before, over the
+/// Time after a rest or a reversal in which the filters still show it, and time before, over the
 /// inverse of their corner.
 const SETTLING: f64 = 1.0;
 const AHEAD: f64 = 0.1;

@@ -1,7 +1,7 @@
-//! The fit of somebody who has been told the whole structure: nominal values, coefficients and
-//! shapes of the hidden effects together, least squares over the fit recordings in the oracle's
-//! band, as one would write it with SciPy or MuJoCo's system identification. It names nothing; its
-//! held-out gain is what a tool that names can be measured by.
+//! The fit of somebody who is given the whole structure: nominal values, coefficients and shapes of
+//! the hidden effects together, least squares over the fit recordings in the oracle's band, as one
+//! would write it with SciPy or MuJoCo's system identification. It names nothing; its held-out gain
+//! is the reference for a tool that names.
 
 use super::band::{Band, NOMINAL, prior};
 use super::laws::{effective_command, forces};

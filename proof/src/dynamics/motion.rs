@@ -24,7 +24,7 @@ pub(crate) struct Motion {
     pub(crate) tilt: Vec<f64>,
     pub(crate) force: Vec<f64>,
     /// The row cannot be judged: too slow for a direction, or so near to a reversal that the
-    /// low-passed speed does not tell it.
+    /// low-passed speed does not show it.
     pub(crate) rest: Vec<bool>,
 }
 

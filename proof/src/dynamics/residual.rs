@@ -31,7 +31,7 @@ impl Bench {
     /// Reads rig and recordings.
     ///
     /// # Errors
-    /// What cannot be read, or what the key does not tell.
+    /// Fails if a file cannot be read, or if the key lacks a value.
     pub(crate) fn new(paths: &Paths, key: &Key) -> Result<Self, String> {
         let oracle = key.oracle.as_ref().ok_or("the key has no oracle")?;
         let truth = key.true_inertia.ok_or("the key does not tell the true inertia")?;
@@ -60,10 +60,10 @@ impl Bench {
         Ok(patched::left(&self.rig, &patched, &self.held)? * self.truth / patched.inertia)
     }
 
-    /// The same of a fit that has been told the whole structure.
+    /// The same of a fit that is given the whole structure.
     ///
     /// # Errors
-    /// Which of the hidden effects nothing is fitted to.
+    /// Fails if nothing is fitted to one of the hidden effects, and names it.
     pub(crate) fn known_structure(&self, key: &Key) -> Result<f64, String> {
         let (left, inertia) = known::left(&self.rig, key, &self.fits, &self.held, self.floor)?;
         Ok(left * self.truth / inertia)

@@ -89,7 +89,7 @@ pub(crate) struct Rig {
     pub(crate) gain: f64,
     pub(crate) limit: f64,
     pub(crate) counts_per_unit: f64,
-    /// Travel per turn; 2π where it is rotary, unknown where it is linear and not told.
+    /// Travel per turn; 2π where it is rotary, unknown where it is linear and not given.
     pub(crate) turn: Option<f64>,
     pub(crate) start_spread: Option<f64>,
     /// Relative standard deviations by name; absolute for the offset.

@@ -269,7 +269,7 @@ fn find_scales(builder: &CaseBuilder) -> Option<Vec<(usize, f64)>> {
     Some(scales)
 }
 
-/// Measures every effect again, alone, as it is beside the others: effect over noise. `None`: the
+/// Measures every effect again, by itself, at its scale in the case: effect over noise. `None`: the
 /// motion diverges.
 fn measured_alone(builder: &CaseBuilder, scales: &[(usize, f64)]) -> Option<Vec<f64>> {
     let strength = |&(i, s): &(usize, f64)| {

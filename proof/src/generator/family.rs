@@ -15,7 +15,7 @@ pub(crate) struct Needs {
     pub(crate) place: bool,
     /// No weight, no tilt (they would hide the effect), or both wanted.
     pub(crate) tilt: Option<bool>,
-    /// The nominal model has no offset key, and there is none.
+    /// The nominal model has no offset key, and the machine has no offset.
     pub(crate) no_offset: bool,
     /// Only machines that turn fast.
     pub(crate) fast: bool,

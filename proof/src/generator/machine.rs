@@ -27,7 +27,7 @@ pub(crate) struct Machine {
     pub(crate) duration: f64,
     /// True if the rig file states the turn.
     pub(crate) turn_told: bool,
-    /// Start spread as the rig file tells it.
+    /// Start spread as the rig file gives it.
     pub(crate) start_spread: Option<f64>,
     pub(crate) offset_key: bool,
     pub(crate) weight_key: bool,
@@ -35,7 +35,7 @@ pub(crate) struct Machine {
     pub(crate) tilt: bool,
     pub(crate) clock: Clock,
     pub(crate) stamping: Stamping,
-    /// Standard deviation of a reading beyond its rounding, counts, and whether the rig file tells
+    /// Standard deviation of a reading beyond its rounding, counts, and whether the rig file gives
     /// it.
     pub(crate) noise_counts: f64,
     pub(crate) noise_told: bool,

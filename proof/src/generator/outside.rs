@@ -21,7 +21,7 @@ pub(crate) const FOREIGN: [&str; 11] = [
     "travel_times_speed",
 ];
 
-/// Kinds that the tool tells for what they are, without a name: no longer outside.
+/// Kinds that the tool recognises without a name for them: no longer outside.
 const DETECTED: [&str; 5] = ["creep_spring", "hum", "payload_change", "linkage_inertia", "gear_loss"];
 
 /// True if the tool has a detector for it.

@@ -15,7 +15,7 @@ pub(crate) struct Spec {
     pub(crate) strength: f64,
     /// The number of the draw among those of the same kind.
     pub(crate) repeat: usize,
-    /// Plays one of these alone: recordings that cannot tell.
+    /// Plays one of these alone: recordings that do not suffice for a verdict.
     pub(crate) poor: Option<&'static [Kind]>,
     /// Rate in Hz and duration in s, where they are not drawn.
     pub(crate) recorder: Option<(f64, f64)>,

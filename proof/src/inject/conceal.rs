@@ -32,7 +32,7 @@ pub(crate) struct Concealed {
 pub(crate) struct Changed {
     pub(crate) command: Vec<f64>,
     pub(crate) counts: Vec<f64>,
-    /// Error of reading at the rows, rad or m; empty where there is none.
+    /// Error of reading at the rows, rad or m; empty for an effect without one.
     pub(crate) error: Vec<f64>,
 }
 
@@ -43,8 +43,8 @@ impl Changed {
     }
 }
 
-/// The recording with the effect in it; `index` tells recordings apart: each has an encoder's zero
-/// of its own.
+/// The recording with the effect in it; `index` distinguishes recordings: each has an encoder's
+/// zero of its own.
 pub(crate) fn conceal(
     effect: &Concealed,
     r: &Recording,

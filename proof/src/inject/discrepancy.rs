@@ -1,8 +1,8 @@
-//! A flexible discrepancy for the plain rival: what a machine has beside any law is a smooth force
-//! over speed, travel, time, the way since a reversal and the drive's force, a Gaussian process of
-//! reduced rank (Solin and Särkkä 2020). Every hypothesis carries it, the one without a law
-//! included, orthogonal to its own regressors (Plumlee 2017) and with the scale of the hypothesis
-//! without one, so that a law wins by its shape and not by taking something.
+//! A flexible discrepancy for the plain rival: the part of a machine that no law covers is a smooth
+//! force over speed, travel, time, the way since a reversal and the drive's force, a Gaussian
+//! process of reduced rank (Solin and Särkkä 2020). Every hypothesis carries it, the one without a
+//! law included, orthogonal to its own regressors (Plumlee 2017) and with the scale of the
+//! hypothesis without one, so that a law wins by its shape and not by taking something.
 
 use std::f64::consts::PI;
 use std::ops::Range;
@@ -18,7 +18,7 @@ const ROWS_FOR_ONE: f64 = 2.0;
 const LEAST_RATIO: f64 = 1e-2;
 const RATIO_STEP: f64 = 2.0;
 const RATIOS: usize = 16;
-/// A pivot below this part of its column is none: the column depends on others.
+/// A pivot below this part of its column does not count: the column depends on others.
 const PIVOT: f64 = 1e-10;
 
 /// An input of the discrepancy: its value at a point of a recording, the range of all recordings,

@@ -104,7 +104,7 @@ pub(crate) fn run(options: &Options, tool: &dyn Tool) -> Result<(), String> {
     let report = Report { options, carriers: known.len(), without, planned: wishes.len(), start };
     let work = |wish: &Wish| run_case(wish, &known, options, tool, &scratch.0);
     // A report that cannot be written now is tried again after the next case; the last failure is
-    // told.
+    // reported.
     let save = |done: &[Option<Outcome>]| drop(report.write(done));
     let done = pool::map_and_save(options.jobs, options.budget(), "concealed effects", &wishes, work, save);
     print!("{}", report.write(&done)?);

@@ -1,8 +1,8 @@
 //! The plain rival: forward selection by least squares on shares of the force error, as an engineer
 //! writes it in an evening. A law counts by the smaller of its reductions on stretches left out of
 //! the fit and on the held-out recordings, and only if its size is the same on both within a factor
-//! of two; the best goes in, which is the one that takes most, or the one with the largest
-//! evidence beside a flexible discrepancy. Laws of the command act on the command that the model so
+//! of two; the best goes in, which is the one that takes most, or the one with the largest evidence
+//! in addition to a flexible discrepancy. Laws of the command act on the command that the model so
 //! far predicts, never on the recorded one, which holds the noise that is to be explained.
 
 use std::rc::Rc;
@@ -23,8 +23,8 @@ const SAME_SIZE: f64 = 2.0;
 pub(crate) enum Best {
     /// The one that takes most.
     TakesMost,
-    /// The one with the largest evidence beside a flexible discrepancy, if that is more than
-    /// without it.
+    /// The one with the largest evidence in addition to a flexible discrepancy, if that is more
+    /// than without it.
     Evidence,
 }
 
@@ -34,8 +34,8 @@ pub(crate) struct Found {
     pub(crate) name: &'static str,
     /// Share of the force error that it took.
     pub(crate) share: f64,
-    /// Evidence that it adds beside a flexible discrepancy, nats, where that was asked for, and
-    /// its lead over every other law.
+    /// Evidence that it adds to a flexible discrepancy, nats, where that was asked for, and its
+    /// lead over every other law.
     pub(crate) nats: f64,
     pub(crate) lead: f64,
 }
@@ -103,7 +103,7 @@ fn best(enough: Vec<(Found, Rc<Tried>)>, by: Best) -> Option<(Found, Rc<Tried>)>
     (by == Best::TakesMost || first.nats > 0.0).then(|| (Found { lead, ..*first }, Rc::clone(tried)))
 }
 
-/// The hypothesis of the laws so far beside a flexible discrepancy.
+/// The hypothesis of the laws so far together with a flexible discrepancy.
 struct Beside {
     basis: Basis,
     scale: Scale,
@@ -221,8 +221,8 @@ fn share(
     least.is_finite().then_some(least)
 }
 
-/// The drive's force that the nominal model alone asks for, on every recording's grid: its laws so
-/// far are small beside it.
+/// The drive's force that the nominal model alone asks for, on every recording's grid: the forces
+/// of the laws so far are small compared with it.
 fn predictions(sights: &[Sight], coefficients: &[f64]) -> Vec<Vec<f64>> {
     sights
         .iter()

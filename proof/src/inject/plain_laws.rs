@@ -1,5 +1,6 @@
-//! The laws that the plain rival knows, each on a small grid of shapes, as one or two columns that
-//! stand where the drive's force stands: what the drive has to give more.
+//! The laws that the plain rival knows, each on a small grid of shapes, as one or two columns on
+//! the same side of the equation as the drive's force: the additional force that the drive has to
+//! give.
 
 use std::f64::consts::TAU;
 

@@ -94,8 +94,8 @@ pub(crate) enum Side {
     Reading,
 }
 
-/// The names of the contract that are concealed. Gaps, springs and slip between two masses are not:
-/// a recording of the motor does not tell what the load did.
+/// The names of the contract that are concealed. Gaps, springs and slip between two masses are not
+/// concealed: a recording of the motor does not show what the load did.
 pub(crate) const NAMES: [&str; 22] = [
     "viscous_friction",
     "coulomb_friction",

@@ -8,7 +8,7 @@ use crate::stats::{Rate, quantile};
 #[derive(Clone, Debug)]
 pub(crate) enum Figure {
     Rate(Rate),
-    /// Shares of one, of which median and tenth percentile are told.
+    /// Shares of one, of which median and tenth percentile are reported.
     Shares(Vec<f64>),
     Count(usize),
 }

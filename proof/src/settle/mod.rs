@@ -1,6 +1,6 @@
-//! `--settle`: plants concealed in the virtual device, which `host-sim settle` is to name; beside
-//! it, in the same time of motion, random multisines, the set of `characterise`, and strokes as in
-//! practice.
+//! `--settle`: plants concealed in the virtual device, which `host-sim settle` is to name; for
+//! comparison, in the same time of motion, random multisines, the set of `characterise`, and
+//! strokes as in practice.
 
 mod earlier;
 mod given;
@@ -157,7 +157,7 @@ pub(crate) fn run(options: &Options) -> Result<(), String> {
         write(options, &all, count, &mark)
     };
     // A report that cannot be written now is tried again after the next plant; the last failure is
-    // told.
+    // reported.
     let save = |new: &[Option<Judged>]| drop(write_all(new));
     let new = pool::map_and_save(options.jobs, options.budget(), "settled", &left, work, save);
     print!("{}", write_all(&new)?);
@@ -218,7 +218,7 @@ fn json_of(plant: &Judged, inputs: &[&str]) -> Value {
     json!({ "plant": plant.index, "kind": plant.kind.words(), "truth": plant.names, "answers": answers })
 }
 
-/// `host-sim`, beside this program.
+/// `host-sim`, next to this program.
 fn program() -> Result<PathBuf, String> {
     let own = std::env::current_exe().map_err(|e| format!("the program's own folder is unknown: {e}"))?;
     let path = own.with_file_name(format!("host-sim{}", std::env::consts::EXE_SUFFIX));

@@ -95,7 +95,7 @@ pub(crate) trait EffectLaw: Sync {
         None
     }
 
-    /// True if its law reads the command beside the motion.
+    /// True if its law reads the command in addition to the motion.
     fn reads_command(&self, _effect: &Effect) -> bool {
         false
     }

@@ -71,7 +71,7 @@ impl Span {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Allowed {
     /// Gain over inertia as far as it is known, the factor by which the truth may differ, and
-    /// whether force has told it.
+    /// whether a measured force gave it.
     pub(crate) gain: f64,
     pub(crate) gain_reach: f64,
     pub(crate) is_anchored: bool,
@@ -220,7 +220,8 @@ pub(crate) trait EffectSearch {
         1
     }
 
-    /// Others that recordings which show so much cannot tell from it, however well either fits.
+    /// Other effects that recordings which show so much cannot distinguish from it, however well
+    /// either fits.
     fn twins(&self, _effect: &Effect, _shown: &Shown) -> Vec<EffectName> {
         Vec::new()
     }

@@ -47,7 +47,7 @@ pub struct Formula {
     expression: FlatEx<f64>,
     /// The source of each of the expression's variables.
     sources: Vec<Source>,
-    /// Parameters that it is linear in; `scale` alone where there are none.
+    /// Parameters that it is linear in; `scale` alone if it has no such parameters.
     linear: Vec<String>,
     /// The others, with their bounds.
     shape: Vec<(&'static str, f64, f64)>,

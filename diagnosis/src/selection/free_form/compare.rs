@@ -52,7 +52,7 @@ impl Gain {
     }
 }
 
-/// A model and what it takes with each form beside it.
+/// The density of a model alone, and with each form added to it.
 pub(crate) struct Densities {
     pub(crate) alone: Density,
     pub(crate) with: Vec<(Inputs, Density)>,
@@ -74,7 +74,7 @@ pub(crate) struct Standing {
     pub(crate) against: Option<Against>,
 }
 
-/// A form and what it takes beside a model.
+/// A form and what it gains in addition to a model.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Taken {
     pub(crate) inputs: Inputs,

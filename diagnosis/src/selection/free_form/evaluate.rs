@@ -298,8 +298,8 @@ impl Evaluator<'_> {
         Normal::new(self, &base, None).density(&base.precision)
     }
 
-    /// The force of a form beside a model, fitted to all blocks; of an angle, as in the first
-    /// recording. `inertia` makes force of acceleration.
+    /// The force of a form in addition to a model, fitted to all blocks; if it is over an angle, as
+    /// in the first recording. `inertia` converts acceleration to force.
     pub(crate) fn shape(&self, model: &Model, inputs: Inputs, inertia: f64) -> Option<Shape> {
         let form = self.forms.iter().find(|form| form.inputs == inputs && !form.frequency.is_empty())?;
         let base = self.base(model);

@@ -24,7 +24,7 @@ use std::sync::Arc;
 
 /// Laws that go in at most.
 const MOST: usize = 3;
-/// Fewest rows of a recording that can tell anything.
+/// Fewest rows of a recording that is used.
 const FEWEST_ROWS: usize = 40;
 
 /// A law that went in.

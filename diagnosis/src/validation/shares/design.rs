@@ -22,7 +22,7 @@ impl Products {
         let p = columns.len();
         let mut folds = vec![Square::zero(p + 1); FOLDS];
         let mut rows = vec![0.0; FOLDS];
-        // Rows of one fold stand together.
+        // Rows of one fold are contiguous.
         let mut from = 0;
         while from < sight.fold.len() {
             let fold = sight.fold[from];

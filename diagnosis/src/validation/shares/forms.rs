@@ -1,4 +1,4 @@
-//! Forces of any form over the motion, as columns: they stand for physics without a name.
+//! Forces of any form over the motion, as columns: they represent physics without a name.
 
 use super::laws::Columns;
 use super::sight::Sight;
@@ -13,7 +13,7 @@ const FORMS: [Inputs; 5] =
     [Inputs::Speed, Inputs::Travel, Inputs::TravelSpeed, Inputs::SinceReversalSpeed, Inputs::TimeSpeed];
 
 /// Returns the columns of forms; each coefficient is about `sd`, N·m or N. `instead` is the effect
-/// in whose place they stand, `fits` how many of the recordings are fitted.
+/// that they replace, `fits` how many of the recordings are fitted.
 pub(crate) fn forms<'a>(
     sights: &'a [Sight],
     fits: usize,

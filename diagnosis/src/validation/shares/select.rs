@@ -62,7 +62,7 @@ impl Selection<'_> {
         if self.left(&other) < (1.0 - SURELY) * self.left(&taken) { other } else { taken }
     }
 
-    /// Judges laws without those that, beside the rest, take less than `least`.
+    /// Judges laws without those that take less than `least` in addition to the rest.
     pub(crate) fn judged(&self, mut taken: Vec<Columns>, least: f64) -> Vec<Selected> {
         loop {
             let judged = self.swapped(&mut taken);
@@ -82,7 +82,8 @@ impl Selection<'_> {
         (fit.sqrt() * holdout.sqrt()).sqrt()
     }
 
-    /// The laws that take `least` beside the others and count, without the rest, the least first.
+    /// The laws that take `least` in addition to the others and count, found by removing the least
+    /// first.
     fn kept_of(
         &self,
         mut laws: Vec<Columns>,
@@ -123,7 +124,7 @@ impl Selection<'_> {
             let mut place = self.in_place_of(taken, i);
             if let Some(better) = place.as_mut().and_then(|ranked| ranked.better.take()) {
                 taken[i] = better;
-                // What was ranked before stood beside another effect.
+                // The earlier ranks were with another effect in the model.
                 ranked.iter_mut().for_each(|one| *one = None);
                 continue;
             }
@@ -200,7 +201,7 @@ impl Selection<'_> {
         parallel::map_all(&same, share).iter().flatten().map(Share::least).fold(0.0, f64::max)
     }
 
-    /// The share of an effect of known shape beside others.
+    /// The share of an effect of known shape in addition to others.
     pub(crate) fn beside(&self, effect: &Effect, others: &[&Effect]) -> Option<Share> {
         let nominal = self.context.nominal;
         let first = State::new(self, Vec::new());
@@ -211,8 +212,8 @@ impl Selection<'_> {
     }
 
     /// The force that the motion misses over the force that a law of the command takes from the
-    /// recorded one, on fitted and on held-out recordings, beside other effects; none for an effect
-    /// that is no such law.
+    /// recorded one, on fitted and on held-out recordings, with other effects in the model; none
+    /// for an effect without such a law.
     pub(crate) fn size_of_map(&self, effect: &Effect, others: &[&Effect]) -> Option<(f64, f64)> {
         let nominal = self.context.nominal;
         let first = State::new(self, Vec::new());
@@ -222,7 +223,7 @@ impl Selection<'_> {
         Some(state.sizes(&taken_from_command(effect, &self.sights, nominal)?))
     }
 
-    /// The share of law `i` beside the others, with its rivals.
+    /// The share of law `i` in addition to the others, with its rivals.
     fn in_place_of(&self, taken: &[Columns], i: usize) -> Option<Ranked> {
         let others = taken.iter().enumerate().filter(|(k, _)| *k != i).map(|(_, c)| c).collect();
         let state = State::new(self, others);

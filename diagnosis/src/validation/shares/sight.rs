@@ -16,7 +16,7 @@ const ROWS_PER_PERIOD: f64 = 4.0;
 const MOST_ROWS: usize = 4000;
 /// Part of a column's square that swings about its mean below which the column is constant.
 const CONSTANT: f64 = 1e-3;
-/// Fewest rows of a recording that can tell anything.
+/// Fewest rows of a recording that is used.
 pub(crate) const FEWEST_ROWS: usize = 25;
 
 /// A recording in one band.

@@ -133,7 +133,7 @@ impl<'a> State<'a> {
         let residuals: Vec<Vec<f64>> = (0..context.tracks.len()).map(|r| now.fit.residual(r)).collect();
         let all = context.that_may_show(&now.model, wanted);
         let is_periodic = |name: &N| name.definition().is_periodic();
-        // Waves that stand out as a force may be of the drive, and the other way round.
+        // Waves that are significant as a force may belong to the drive, and the other way round.
         let sought: Vec<N> = match all.iter().any(is_periodic) {
             true => N::ALL.iter().copied().filter(is_periodic).collect(),
             false => Vec::new(),

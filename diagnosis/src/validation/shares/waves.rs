@@ -1,6 +1,6 @@
-//! The waves of an effect that repeats along the travel: those that stand out under the noise, and
-//! the whole orders of a known turn by their own shares, since other physics may hide them from a
-//! likelihood.
+//! The waves of an effect that repeats along the travel: those that are significant under the
+//! noise, and the whole orders of a known turn by their own shares, since other physics may hide
+//! them from a likelihood.
 
 use super::laws::Columns;
 use super::state::State;
@@ -19,7 +19,7 @@ type Tried = (f64, Columns);
 
 impl State<'_> {
     /// The waves that take most on stretches left out of the fit, as those of one effect; `found`
-    /// stand out under the noise.
+    /// are those significant under the noise.
     pub(super) fn best_waves(&self, name: N, found: &[Effect]) -> Option<Columns> {
         let standing = found.iter().filter_map(|one| self.tried(Effect { name, ..one.clone() }));
         let best = standing.chain(self.best_orders(name)).max_by(|a, b| a.0.total_cmp(&b.0));
