@@ -218,7 +218,7 @@ async function pipelines(device, layout, format) {
     multisample: { count: SAMPLES_PER_PIXEL },
     depthStencil: {
       format: DEPTH_FORMAT, depthWriteEnabled: !clear, depthCompare: "less",
-      // Before what lies in the same plane.
+      // In front of surfaces in the same plane.
       depthBias: near ? -8 : 0, depthBiasSlopeScale: near ? -4 : 0,
     },
   });

@@ -1,5 +1,5 @@
-// The tasks of a procedure beside moving the needle (tourniquet, plunger, catheter): a button for each. The server reports what was done,
-// for the scripted hand does them too.
+// The tasks of a procedure in addition to moving the needle (tourniquet, plunger, catheter): a
+// button for each. The server reports what was done, because the scripted hand does them too.
 
 import { capital, t, taskName } from "./language.js";
 
