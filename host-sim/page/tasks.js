@@ -43,7 +43,8 @@ export class Tasks {
   }
 }
 
-/** The mistakes of an insertion that are not critical, as a clause; empty where there is none. */
+/** Returns the mistakes of an insertion that are not critical, as a clause; empty if there are no
+ *  such mistakes. */
 export function mistakes(tasks) {
   const wrong = (tasks?.list ?? []).filter((one) => one.mistake && !one.is_critical);
   return wrong.map((one) => t(MISTAKES[one.mistake], { task: taskName(one.name) })).join(", ");

@@ -201,7 +201,8 @@ export class Tissue3d {
     }
   }
 
-  /** The layers cut along the needle's plane: simulated in the block, at rest beside and under it. */
+  /** The layers cut along the needle's plane: simulated in the block, at rest next to it and under
+   *  it. */
   section() {
     const facing = [0, 1, 0];
     for (const surface of this.layers) {
