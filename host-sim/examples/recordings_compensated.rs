@@ -25,7 +25,7 @@ const PLACES: usize = 64;
 /// Steps in which a place is sought.
 const SHIFTS: usize = 720;
 
-/// A moving row: position, speed, tilt, and the force needed beside the inertia.
+/// A moving row: position, speed, tilt, and the force needed in addition to the inertia.
 #[derive(Clone, Copy)]
 struct Row {
     position: f64,

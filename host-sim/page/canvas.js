@@ -2,8 +2,9 @@
 
 const MOST_PIXELS_PER_POINT = 2;
 
-/** Keeps `canvas` at its size on screen; `surface.width` and `height` are in points, and so are all drawings. A point is `surface.unit`
- *  CSS pixels: a tenth of the size of text of the whole page (style.css), so that words on a canvas grow with those beside it. */
+/** Keeps `canvas` at its size on screen; `surface.width` and `height` are in points, and so are all
+ *  drawings. A point is `surface.unit` CSS pixels: a tenth of the size of text of the whole page
+ *  (style.css), so that words on a canvas grow with those next to it. */
 export function surface(canvas) {
   const context = canvas.getContext("2d", { alpha: false });
   const result = { canvas, context, width: 1, height: 1, unit: 1 };

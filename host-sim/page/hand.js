@@ -156,7 +156,8 @@ export class Hand {
     this.link.send({ do: "stop" });
   }
 
-  /** Escape stops wherever the focus is and closes what lies over the page; Space stops where no control has the focus. */
+  /** Escape stops wherever the focus is and closes what is over the page; Space stops if no control
+   *  has the focus. */
   key(event) {
     if (event.key === "Escape" || (event.key === " " && !document.activeElement?.matches(CONTROLS))) {
       event.preventDefault();

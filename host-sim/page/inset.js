@@ -1,5 +1,5 @@
-// The vessel cut across, at the top right of the section: an ellipse with its wall, the needle's tip in it or beside it, and that in
-// words.
+// The vessel cut across, at the top right of the section: an ellipse with its wall, the needle's
+// tip in it or next to it, and the same in words.
 
 import { t } from "./language.js";
 

@@ -17,7 +17,8 @@ function steps(from, to) {
 
 export const IDENTITY = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
 
-/** Limb beside the block, square, box: each `{ places, normals, triangles }`, four numbers a point. */
+/** The limb next to the block, a square, a box: each is `{ places, normals, triangles }`, with four
+ *  numbers per point. */
 export function shapes() {
   const square = { places: [0, 0, 0, 1, 1, 0, 0, 1, 1, 0, 1, 1, 0, 0, 1, 1], normals: new Array(16).fill(0), triangles: [0, 1, 2, 0, 2, 3] };
   return {
@@ -167,7 +168,7 @@ export function look(eye, target) {
   return [right[0], up[0], back[0], 0, right[1], up[1], back[1], 0, right[2], up[2], back[2], 0, -dot(right, eye), -dot(up, eye), -dot(back, eye), 1];
 }
 
-/** Matrices stand column by column. */
+/** Matrices are stored column by column. */
 export function multiply(a, b) {
   const product = new Array(16).fill(0);
   for (let column = 0; column < 4; column++)

@@ -60,7 +60,7 @@ void main() {
 const PASSES = {
   opaque: { blend: false, offset: false },
   clear: { blend: true, offset: false },
-  // Before what lies in the same plane.
+  // In front of surfaces in the same plane.
   clearNear: { blend: true, offset: true },
 };
 

@@ -84,7 +84,8 @@ const MOST_MESHES = 128;
 export class WebGpu {
   name = "webgpu";
 
-  /** Null where there is none, or none but a processor that pretends (`evenInSoftware` takes that too). */
+  /** Returns null if WebGPU is not available, or only in software (which `evenInSoftware`
+   *  accepts). */
   static async open(canvas, evenInSoftware) {
     const adapter = await navigator.gpu?.requestAdapter();
     const pretends = adapter?.info?.isFallbackAdapter ?? adapter?.isFallbackAdapter;
@@ -202,7 +203,7 @@ function uniform(binding, hasDynamicOffset) {
   return { binding, visibility: GPUShaderStage.VERTEX | GPUShaderStage.FRAGMENT, buffer: { type: "uniform", hasDynamicOffset } };
 }
 
-/** One pipeline for each way in which a mesh covers what lies behind it. */
+/** One pipeline for each way in which a mesh covers what is behind it. */
 async function pipelines(device, layout, format) {
   const module = device.createShaderModule({ code: SHADER });
   const buffers = [0, 1].map((shaderLocation) => ({
@@ -218,7 +219,7 @@ async function pipelines(device, layout, format) {
     multisample: { count: SAMPLES_PER_PIXEL },
     depthStencil: {
       format: DEPTH_FORMAT, depthWriteEnabled: !clear, depthCompare: "less",
-      // Before what lies in the same plane.
+      // In front of surfaces in the same plane.
       depthBias: near ? -8 : 0, depthBiasSlopeScale: near ? -4 : 0,
     },
   });

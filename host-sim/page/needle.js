@@ -17,7 +17,8 @@ export function wholeLength(needle) {
   return needle.length_mm + needle.hub_length_mm;
 }
 
-/** Distance of the hub's farther corner from the line through the tip, mm: the cannula's axis lies a radius beside that line. */
+/** Distance of the hub's farther corner from the line through the tip, mm: the cannula's axis is a
+ *  radius away from that line. */
 export function halfHub(needle) {
   return (needle.hub_diameter_mm + needle.diameter_mm) / 2;
 }

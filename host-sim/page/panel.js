@@ -109,7 +109,7 @@ export class Panel {
     });
     const [state, tone] = stateWords(view, condition, this.played);
     chip("state", state, tone);
-    // A screen reader is told what has changed, not each phase of an insertion.
+    // A screen reader announces what has changed, not each phase of an insertion.
     const banner = byId("banner");
     write(byId("announcement"), banner.hidden ? (tone === "good" ? state.split(":")[0].trim() : state) : banner.textContent);
     for (const slider of this.sliders) sayValue(slider);

@@ -49,7 +49,7 @@ function ticks(range, most, draw) {
   for (let value = Math.ceil(range.low / step) * step; value <= range.high + 1e-9; value += step) draw(value);
 }
 
-/** Free space beside the name of a puncture, in points: half before it and half after. */
+/** Free space around the name of a puncture, in points: half before it and half after. */
 const NAME_GAP = 8;
 
 const label = (value, step) => number(value, step < 1 ? 1 : 0);

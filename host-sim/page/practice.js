@@ -137,7 +137,8 @@ export class Practice {
     if (event.kind === "exit" && event.layer === 0) this.touchedAt = NaN;
   }
 
-  /** Returns the tip's place of the best insertion at this time after its first touch, mm; NaN if there is none to show. */
+  /** Returns the tip's place of the best insertion at this time after its first touch, mm; NaN if
+   *  no place is to be shown. */
   ghost(now) {
     const path = this.best?.path;
     const since = now - this.touchedAt;

@@ -19,7 +19,8 @@ const FIBRES = 7;
 const FIBRE_DASH = [38, 13, 64, 21, 17, 11];
 
 export class Section {
-  /** `small`: among many others, with figures beside it: no ruler and no arrow. */
+  /** `small` is for a section among many others, with figures next to it: it has no ruler and no
+   *  arrow. */
   constructor(canvas, colours, small = false) {
     this.small = small;
     this.surface = surface(canvas);
@@ -188,7 +189,8 @@ export class Section {
     }
   }
 
-  /** The vessel, cut along: near wall, lumen, far wall. One that the needle passes beside is only hinted at. */
+  /** Draws the vessel, cut along: near wall, lumen, far wall. A vessel that the needle misses is
+   *  only hinted at. */
   vessel(g, tissue, width) {
     const vessel = tissue.vessel;
     if (!vessel) return;

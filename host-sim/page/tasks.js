@@ -1,5 +1,5 @@
-// The tasks of a procedure beside moving the needle (tourniquet, plunger, catheter): a button for each. The server reports what was done,
-// for the scripted hand does them too.
+// The tasks of a procedure in addition to moving the needle (tourniquet, plunger, catheter): a
+// button for each. The server reports what was done, because the scripted hand does them too.
 
 import { capital, t, taskName } from "./language.js";
 
@@ -43,7 +43,8 @@ export class Tasks {
   }
 }
 
-/** The mistakes of an insertion that are not critical, as a clause; empty where there is none. */
+/** Returns the mistakes of an insertion that are not critical, as a clause; empty if there are no
+ *  such mistakes. */
 export function mistakes(tasks) {
   const wrong = (tasks?.list ?? []).filter((one) => one.mistake && !one.is_critical);
   return wrong.map((one) => t(MISTAKES[one.mistake], { task: taskName(one.name) })).join(", ");

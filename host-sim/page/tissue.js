@@ -11,7 +11,8 @@ const DRAG_MM_PER_N = 0.35;
 const LARGEST_DRAG_MM = 0.7;
 /** Less than this is not seen. */
 const SMALLEST_DENT_MM = 0.002;
-/** Layers are met along the needle at depth / sin(angle); flatter than this the device tells no angles apart. */
+/** Layers are met along the needle at depth / sin(angle); the device does not distinguish angles
+ *  flatter than this. */
 const FLATTEST = 0.087;
 
 export class Tissue {

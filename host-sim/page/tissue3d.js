@@ -116,7 +116,7 @@ export class Tissue3d {
     // A body brings its own surroundings.
     const bands = this.body ? [] : scene.layers.filter((layer) => !layer.is_vessel && !layer.is_far_wall);
     this.bands = bands.map((layer, i) => ({ name: layer.name, top: layer.depth_mm, bottom: bands[i + 1]?.depth_mm ?? DEEP_MM }));
-    // In the needle's plane; beside it the limb curves down.
+    // The lowest point in the needle's plane; outside that plane the limb curves down.
     const points = picture.points;
     this.blockBottom = 0;
     for (let i = 0; i < points.length; i += 4) {
@@ -201,7 +201,8 @@ export class Tissue3d {
     }
   }
 
-  /** The layers cut along the needle's plane: simulated in the block, at rest beside and under it. */
+  /** The layers cut along the needle's plane: simulated in the block, at rest next to it and under
+   *  it. */
   section() {
     const facing = [0, 1, 0];
     for (const surface of this.layers) {

@@ -72,7 +72,7 @@ export class Clock {
     else this.offset += 0.05 * (offset - this.offset);
   }
 
-  /** Seconds of the device's clock; stands still when nothing arrives. */
+  /** Returns the time of the device's clock, s; it stops when nothing arrives. */
   now(nowMs) {
     return Math.min(nowMs / 1000 + this.offset, this.newest + 0.1);
   }

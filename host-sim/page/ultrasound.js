@@ -1,4 +1,4 @@
-// The ultrasound image beside the limb, and the probe that a person moves over the skin.
+// The ultrasound image next to the limb, and the probe that a person moves over the skin.
 
 import { IMAGE_WIDTH_MM, LINES, SAMPLES } from "./picture.js";
 import { surface } from "./canvas.js";

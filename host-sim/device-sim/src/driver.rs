@@ -1,5 +1,5 @@
-//! The PC's side of a conversation with a device, without clock or cable of its own: it is told the
-//! time and handed bytes.
+//! The PC's side of a conversation with a device. It has no clock or cable of its own: the caller
+//! passes it the time and the bytes.
 //!
 //! On a new connection it says hello, stops the device, configures it, and starts it only where a
 //! person asks: no set value of an earlier connection is ever played again. Commands are repeated

@@ -1,9 +1,9 @@
 //! The device without its hardware: plant and hand in floating point, the firmware's control core
-//! on them, and what a person chooses: patient, procedure, session. [`page`] is what a page is
-//! told.
+//! on them, and what a person chooses: patient, procedure, session. [`page`] has the messages to a
+//! page.
 //!
-//! No files but those a person names, no sockets, no ports: the browser's build (`site-wasm`) takes
-//! it as it is.
+//! It opens no sockets, no ports, and no files except those that a person names, so that the
+//! browser's build (`site-wasm`) uses it unchanged.
 
 pub mod device;
 pub mod driver;

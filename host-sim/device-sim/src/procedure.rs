@@ -256,7 +256,8 @@ impl Step {
             (None, Some(past)) => {
                 let tissue = Tissue::from(past);
                 let layers = &profile.config.patient.layers;
-                // The line through a body may pass beside it: then the hand goes to the last layer.
+                // The line through a body may miss the tissue: then the hand goes to the last
+                // layer.
                 let last = layers.last().filter(|_| profile.body.is_some());
                 let layer = layers.iter().find(|l| l.tissue == tissue).or(last).ok_or_else(|| {
                     format!(

@@ -98,7 +98,8 @@ impl Case {
                 folder.display()
             ));
         }
-        // Where only recordings tell, an input stays where they were: it may begin at a stop.
+        // If only the recordings give the limits, an input stays within their range: the axis may
+        // begin at a stop.
         let limits = Limits {
             travel: travel.unwrap_or(shown.ahead),
             back: travel.unwrap_or(shown.behind.max(LEAST_BACK * shown.ahead)),

@@ -1,5 +1,5 @@
-//! The choice of the input: segments are added one after another, each the one that best tells the
-//! rivals apart together with those before it.
+//! The choice of the input: segments are added one after another. Each is the one that, together
+//! with those before it, best distinguishes the rivals.
 
 use crate::candidates::candidates;
 use crate::case::{Case, Rival};
@@ -33,7 +33,7 @@ pub struct Pair {
     pub nats: f64,
 }
 
-/// An input with what it tells.
+/// An input with the evidence that it is expected to give.
 #[derive(Clone, Debug)]
 pub struct Alternative {
     /// The input.
@@ -134,8 +134,8 @@ impl Bench<'_> {
         Some(Sums((0..rivals.len()).map(row).collect()))
     }
 
-    /// Adds segments to a first one while they pay, up to `most_s`, and one that travels if there
-    /// is none.
+    /// Adds segments to a first one while they pay, up to `most_s`, and one that travels if no
+    /// segment does.
     fn grown(&self, first: usize, all: &[(Segment, Sums)], most_s: f64) -> Vec<usize> {
         let value = |sums: &Sums| criterion(&self.case.rivals, &sums.nats());
         let (mut parts, mut sums) = (vec![first], all[first].1.clone());
@@ -194,7 +194,7 @@ impl Bench<'_> {
     }
 }
 
-/// The length of the shortest segment that travels, s; infinite if there is none.
+/// Returns the length of the shortest segment that travels, s; infinite if no segment travels.
 fn shortest_travel_s(all: &[(Segment, Sums)]) -> f64 {
     let travelling = all.iter().filter(|(segment, _)| segment.signal.travels());
     travelling.map(|(segment, _)| segment.seconds).fold(f64::INFINITY, f64::min)
@@ -208,7 +208,7 @@ fn best(all: impl Iterator<Item = (usize, f64, f64)>) -> Option<(usize, f64, f64
     near.min_by(|a, b| a.2.total_cmp(&b.2).then(b.1.total_cmp(&a.1)))
 }
 
-/// Designs the input of at most `most_s` that best tells the rivals of a case apart; `seed` draws
+/// Designs the input of at most `most_s` that best distinguishes the rivals of a case; `seed` draws
 /// the library.
 ///
 /// # Errors

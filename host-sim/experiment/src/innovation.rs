@@ -107,7 +107,7 @@ fn along(rig: &Rig, motion: &Prediction, rows: usize) -> Along {
     out
 }
 
-/// True for each block in which the axis rests: friction is a reaction there and tells nothing.
+/// True for each block in which the axis rests: friction is a reaction there and gives no evidence.
 fn rests(motion: &Prediction, filter: &Filter) -> Vec<bool> {
     let around = (REST_S / STEP_S) as usize;
     let last = motion.position.len() - 1;

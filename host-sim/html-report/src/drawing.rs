@@ -26,7 +26,7 @@ pub(crate) fn ticks(low: f64, high: f64, step: f64) -> Vec<f64> {
     (first..=last).take(MOST_TICKS).map(|k| k as f64 * step).collect()
 }
 
-/// Returns the decimals that tell a multiple of `step` from its neighbours.
+/// Returns the number of decimals that distinguish a multiple of `step` from its neighbours.
 pub(crate) fn decimals(step: f64) -> usize {
     (-(step * 1.0001).log10().floor()).clamp(0.0, 9.0) as usize
 }

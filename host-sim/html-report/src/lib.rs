@@ -41,7 +41,8 @@ impl Cell {
         Self::Text(words.into())
     }
 
-    /// A number with as many decimals as are worth reading, or a dash where there is none.
+    /// Returns a number with as many decimals as are worth reading, or a dash if the number is
+    /// missing.
     pub fn number(value: Option<f64>, decimals: usize) -> Self {
         Self::Number(value.filter(|v| v.is_finite()).map_or("–".into(), |v| decimal(v, decimals)))
     }

@@ -89,7 +89,7 @@ document.querySelectorAll("svg[data-x]").forEach((svg, number) => {
     const values = curves.flatMap(({ name: curve, points }) => {
       if (!points.length) return [];
       const near = points.reduce((a, b) => Math.abs(b[0] - px) < Math.abs(a[0] - px) ? b : a);
-      // Farther than its neighbours stand apart is a gap.
+      // There is a gap if the nearest point is farther away than the points are apart.
       if (Math.abs(near[0] - px) > Math.max(8, (right - left) / points.length)) return [];
       return [`${curve} ${near.slice(1).map((py) => show(toY(py), y1 - y0)).join(" to ")}`];
     });
@@ -104,7 +104,7 @@ document.querySelectorAll("svg[data-x]").forEach((svg, number) => {
     const [a, b] = [begun, Math.min(right, Math.max(left, within(event)))].sort((one, other) => one - other);
     begun = null;
     chosen.remove();
-    // A click is no stretch, and no stretch is smaller than the numbers tell.
+    // A click does not select a stretch, and no stretch is smaller than the numbers resolve.
     if (b - a > 6 && (b - a) * (to - from) > 1e-3 * (right - left) ** 2) zoom(whole(a), whole(b));
   };
   svg.addEventListener("pointermove", at);

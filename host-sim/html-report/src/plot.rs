@@ -23,7 +23,7 @@ const EDGE: f64 = 6.0;
 /// Ticks of a range.
 const TICKS: f64 = 6.0;
 
-/// A tick's label: as many decimals as tell it from its neighbours.
+/// Returns a tick's label, with as many decimals as distinguish it from its neighbours.
 fn label(value: f64, step: f64) -> String {
     let size = value.abs().max(step);
     if size >= 1e5 || step < 1e-4 {

@@ -137,7 +137,7 @@ impl Section {
         let (low, high) = points().fold((0.0_f64, 1.0_f64), |(a, b), p| (a.min(p.0), b.max(p.0)));
         let head = 30.0 + LINE * self.ways.len() as f64;
         let scale = (HIGHEST / (bottom - top)).min(WIDE / (1.2 * (high - low) + NAMES_MM * bottom));
-        // Names stand on the right: the ways keep to the left of them.
+        // Names are on the right: the ways keep to the left of them.
         let middle = f64::midpoint(low, high);
         let half = WIDE / scale / 2.0;
         let shift = 0.5 * NAMES_MM * bottom;

@@ -87,7 +87,8 @@ pub enum Command {
 }
 
 impl Command {
-    /// The command where none is given: `run` with its defaults, which stand in one place.
+    /// Returns the command if none is given: `run` with its defaults, which are defined in one
+    /// place.
     pub fn usual() -> Self {
         #[derive(Parser)]
         struct Line {

@@ -1,4 +1,5 @@
-//! Messages beside the results, and the browser that a program for people without a terminal opens.
+//! Messages in addition to the results, and the browser that a program for people without a
+//! terminal opens.
 
 use std::io::IsTerminal;
 use std::process::{Command, Stdio};
@@ -59,7 +60,7 @@ pub(crate) fn page_for_others(url: &str) {
     }
 }
 
-/// Asks the system for its browser. Where there is none the address that was printed remains.
+/// Asks the system for its browser. If the system has no browser, the printed address remains.
 fn open(url: &str) {
     let mut command = if cfg!(target_os = "windows") {
         let mut command = Command::new("rundll32");

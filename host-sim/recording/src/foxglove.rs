@@ -1,5 +1,5 @@
 //! Foxglove's well-known messages as Protobuf: the needle's transform, and needle and tissue as a
-//! scene. Whoever knows these schemas draws them without being told what they mean.
+//! scene. A program that knows these schemas draws them without further instructions.
 //!
 //! Written here because a Protobuf library is a large build for two messages of numbers. The
 //! schemas in `schemas/foxglove` are the descriptors of PyPI's `foxglove-schemas-protobuf`; `cargo
@@ -22,7 +22,7 @@ const NEEDLE: &str = "needle";
 const ALONG_MM: f64 = 60.0;
 const ACROSS_MM: f64 = 30.0;
 const DEEPEST_MM: f64 = 10.0;
-/// The turn about y that lays a cylinder, which stands on its z axis, along x.
+/// The turn about y that lays a cylinder, whose axis is z, along x.
 const LAID: [f64; 4] = [0.0, std::f64::consts::FRAC_1_SQRT_2, 0.0, std::f64::consts::FRAC_1_SQRT_2];
 const UPRIGHT: [f64; 4] = [0.0, 0.0, 0.0, 1.0];
 const STEEL: [f64; 4] = [0.7, 0.73, 0.77, 1.0];
@@ -133,7 +133,8 @@ fn needle(ns: u64, needle: &SceneNeedle) -> Vec<u8> {
     entity(ns, NEEDLE, NEEDLE).bytes(10, &cannula).bytes(10, &hub).0
 }
 
-/// Slabs between the layers' tops; the vessel, which the needle points along, lies in one of them.
+/// Draws slabs between the layers' tops; the vessel, which the needle points along, is in one of
+/// them.
 fn tissue(ns: u64, scene: &Scene) -> Vec<u8> {
     let slabs: Vec<_> = scene.layers.iter().filter(|layer| !layer.is_vessel && !layer.is_far_wall).collect();
     let deepest = scene.layers.last().map_or(0.0, |layer| layer.depth_mm) + DEEPEST_MM;

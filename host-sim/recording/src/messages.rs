@@ -41,7 +41,7 @@ pub struct Setup {
     /// where it was the device's own.
     #[serde(default)]
     pub device_toml: Option<String>,
-    /// The tasks that the procedure asks for; none in a recording from before they were told.
+    /// The tasks that the procedure asks for; empty in a recording from before they were recorded.
     #[serde(default)]
     pub tasks: Vec<Task>,
 }
@@ -55,12 +55,13 @@ pub struct Hello {
     pub identity: String,
     /// Version of the firmware.
     pub firmware: [u8; 3],
-    /// The commit that the firmware was built from; unknown in a recording from before it was told.
+    /// The commit that the firmware was built from; unknown in a recording from before it was
+    /// reported.
     #[serde(default)]
     pub build: Build,
     /// CRC-32 of the configuration in force, both parts.
     pub config_hash: u32,
-    /// CRC-32 of its device's part; 0 in a recording from before it was told.
+    /// CRC-32 of its device's part; 0 in a recording from before it was reported.
     #[serde(default)]
     pub device_hash: u32,
     /// Samples a second.
@@ -111,7 +112,8 @@ pub struct Pose {
     pub state: u8,
     /// The limits that held torque back, a bit each.
     pub limits: u8,
-    /// Angle to the skin that the layers were met at; 0 in a recording from before it was told.
+    /// Angle to the skin at which the layers were met; 0 in a recording from before it was
+    /// reported.
     #[serde(default)]
     pub angle_mrad: i16,
     /// The tip's place relative to the vessel, by its number.

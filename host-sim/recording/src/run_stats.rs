@@ -16,7 +16,7 @@ pub struct RunStats {
     pub vessels: u64,
     /// Faults that latched.
     pub faults: u64,
-    /// Largest force that the motor was told to make, N, without its sign.
+    /// Largest magnitude of the force that was commanded of the motor, N.
     pub peak_force_n: f64,
     scale: Option<Hello>,
     limit: Option<u64>,

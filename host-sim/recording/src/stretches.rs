@@ -28,7 +28,7 @@ pub struct Stretch {
 /// The stretches of a recording, in order.
 pub fn stretches(recording: &Recording) -> Vec<Stretch> {
     let (mut all, mut hello): (Vec<Stretch>, Option<Hello>) = (Vec::new(), None);
-    // An event is told before the block of samples that it happened in.
+    // An event is reported before the block of samples in which it happened.
     let mut told = Vec::new();
     let mut tasks = Vec::new();
     let mut setup: Option<&Setup> = None;
@@ -36,7 +36,8 @@ pub fn stretches(recording: &Recording) -> Vec<Stretch> {
         match message {
             Message::Hello(new) => {
                 hello = Some(new.clone());
-                // What a device told of samples that never came is forgotten with them.
+                // Events that a device reported for samples that never came are dropped with those
+                // samples.
                 told.clear();
                 tasks.clear();
             }

@@ -48,7 +48,7 @@ enum Whose {
     NoneGiven,
 }
 
-/// A number of the paper beside ours.
+/// A number of the paper and ours.
 #[derive(Clone, Debug)]
 struct Row {
     what: String,

@@ -183,7 +183,7 @@ fn largest(cuts: &[Cut], measured: bool) -> Vec<Row> {
 }
 
 /// Compares fit-force's table of the paper's five cells with the insertions that it was made from,
-/// and in a sentence how it tells the other four.
+/// and says in a sentence how well it predicts the other four.
 fn fitted(cuts: &[Cut]) -> Result<(Vec<Row>, String), Error> {
     let read = |wanted: bool| -> Result<Vec<_>, Error> {
         let files = cuts.iter().filter(|c| c.is_the_papers() == wanted).map(|c| insertions::read(&c.file));

@@ -33,7 +33,7 @@ struct Row {
     seconds: f64,
 }
 
-/// Pushes each configuration, and writes the state of [`CHECKED`] beside the page.
+/// Pushes each configuration, and writes the state of [`CHECKED`] next to the page.
 fn rows(dir: &Path) -> Result<Vec<Row>, Error> {
     let failed = |refusal: tissue::Refusal| Error::failed(format_args!("Table 1 cannot be built: {refusal}"));
     let mut rows = Vec::new();

@@ -108,8 +108,9 @@ impl PatientManager {
         Profile::parse_for(Text { origin: "the edited patient".into(), text }, &self.device)
     }
 
-    /// The device has taken what was asked; none if nothing was. A patient that was to be saved is:
-    /// the file, or why there is none.
+    /// Applies what was asked, once the device has taken it; `None` if nothing was asked. A patient
+    /// that was to be saved is written: the answer has the file, or the reason why it could not be
+    /// written.
     pub fn taken(&mut self) -> Option<PatientAnswer> {
         let Asked { mut profile, procedure, save_as } = self.asked.take()?;
         let mut answer = PatientAnswer { taken: true, ..PatientAnswer::default() };

@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 const NAP: Duration = Duration::from_millis(5);
 /// A gap in the ticks that is longer than this is skipped: 1 s.
 const LONGEST_GAP: u64 = TICK_HZ as u64;
-/// After a jump whoever looks is told so much of what was before: as long as the plots are, 10 s.
+/// After a jump a viewer receives this much of what came before: the length of the plots, 10 s.
 const TOLD_TICKS: u64 = 10 * TICK_HZ as u64;
 /// Events of longer ago are in nobody's list.
 const TOLD_EVENTS: usize = 80;
@@ -115,8 +115,8 @@ impl<'a> Replay<'a> {
         self.zero_tick = tick;
     }
 
-    /// Goes on from `at_s` into the recording; whoever looks forgets what was shown and is told
-    /// what came before.
+    /// Goes on from `at_s` into the recording; a viewer forgets what was shown and receives what
+    /// came before.
     fn seek(&mut self, at_s: f64) {
         let wanted = (at_s.max(0.0) * f64::from(TICK_HZ)) as u64;
         self.next = self.times.partition_point(|time| *time < wanted);

@@ -1,4 +1,4 @@
-//! `host-sim characterise`: recordings that tell one physical effect from another.
+//! `host-sim characterise`: recordings that distinguish one physical effect from another.
 
 use super::confirm::needle_is_out;
 use clap::Args;

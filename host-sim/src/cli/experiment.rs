@@ -1,4 +1,4 @@
-//! `host-sim experiment`: the input that best tells the rivals of a diagnosis apart.
+//! `host-sim experiment`: the input that best distinguishes the rivals of a diagnosis.
 
 use clap::Args;
 use device_sim::error::Error;

@@ -1,4 +1,4 @@
-//! `host-sim reproduce`: the papers' figures beside ours.
+//! `host-sim reproduce`: the papers' figures compared with ours.
 
 use clap::Args;
 use device_sim::error::Error;

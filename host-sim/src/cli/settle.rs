@@ -1,4 +1,4 @@
-//! `host-sim settle`: the device asks itself what the recordings cannot tell.
+//! `host-sim settle`: further inputs to the device decide what the recordings cannot.
 
 use super::confirm::{Consent, ConsentFlags};
 use clap::{Args, ValueEnum};

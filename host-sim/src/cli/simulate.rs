@@ -1,4 +1,4 @@
-//! `host-sim simulate`: the motion that a user sees, beside the recording.
+//! `host-sim simulate`: the motion that a user sees, compared with the recording.
 
 use clap::Args;
 use convert::simulated;

@@ -191,7 +191,6 @@ fn every_command_has_help_with_an_example() {
     }
 }
 
-/// A limit on the size of files stands in for a full disk: the write fails in the same place.
 #[cfg(unix)]
 /// Completes `host-sim sc` and `host-sim score --x` as bash does.
 #[cfg(unix)]
@@ -211,6 +210,7 @@ fn bash_completes_commands_and_options() {
     refused(&run(&["completions", "tcsh"]), 2, &["tcsh", "bash"]);
 }
 
+/// A limit on the size of files simulates a full disk: the write fails in the same place.
 #[test]
 fn after_a_full_disk_the_recording_so_far_can_be_read() {
     let dir = folder("full");

@@ -10,7 +10,7 @@ const SLEW_MNM_PER_TICK: f64 = 1.0;
 const FADE_TICKS: f64 = 3_000.0;
 const HOLD_N_PER_MM: f64 = 1.0;
 const HEAL_MM: f64 = 0.2;
-/// The tilt is told in mrad: 30° is 524 of them.
+/// The tilt is reported in mrad: 30° is 524 mrad.
 const ANGLE_RAD: f64 = 0.524;
 
 struct Row {

@@ -1,5 +1,5 @@
-//! The commands of docs/diagnosis.md and docs/training.md, run as they stand there, and what the
-//! guide says that they print.
+//! The commands of docs/diagnosis.md and docs/training.md are run exactly as written, and print
+//! what the guide says.
 
 use crate::common::{folder, text};
 use diagnosis::rig::Rig;
@@ -27,7 +27,7 @@ fn blocks(guide: &str, heading: &str) -> Vec<String> {
                 }
             }
             Some(code) => out.push(format!("{code}\n")),
-            // An empty line may stand within a block.
+            // A block may contain an empty line.
             None if line.is_empty() && is_inside => {
                 if let Some(block) = out.last_mut() {
                     block.push('\n');
@@ -41,7 +41,7 @@ fn blocks(guide: &str, heading: &str) -> Vec<String> {
     out
 }
 
-/// Runs a block of commands in a folder that stands for /tmp too; what they print.
+/// Runs a block of commands in a folder that also replaces /tmp, and returns what they print.
 fn run_in(dir: &Path, commands: &str) -> String {
     let program = Path::new(env!("CARGO_BIN_EXE_host-sim"));
     let programs = program.parent().expect("it is in a folder");

@@ -1,5 +1,5 @@
-//! The patient is changed while the device runs: taken whole or refused with the reason, told to
-//! the page and to the recording.
+//! The patient is changed while the device runs: the change is taken whole or refused with the
+//! reason, and reported to the page and to the recording.
 
 use crate::common::folder;
 use control_core::Device;

@@ -82,7 +82,7 @@ fn the_needle_slips_above_the_grip_and_not_below_it() {
     let pull = |grip_force: f64, hand_mm: f64| {
         let mut plant = Plant::new(PlantConfig { grip_force, ..config() }, grip, 0.0);
         for _ in 0..20_000 {
-            // A stiff position loop stands in for a wall.
+            // A stiff position loop acts as the wall.
             let set = (-f64::from(plant.count()) * 0.05 - plant.speed() * 0.02).clamp(-1.0, 1.0);
             plant.tick(set, true, Some((hand_mm * 1e-3, 0.0)));
         }
@@ -93,8 +93,8 @@ fn the_needle_slips_above_the_grip_and_not_below_it() {
     assert!(slip < 1e-4 && force > 1.5, "held: {slip} m at {force} N");
     let (slip, force) = pull(1.0, 2.0);
     assert!((force - 1.0).abs() < 0.02, "it slips at the grip's 1 N, not at {force} N");
-    // The hand is 2 mm ahead and a millimetre stretched; of the other one the loop that stands in
-    // for a wall yields a tenth.
+    // The hand is 2 mm ahead, and its grip is stretched by 1 mm. The position loop that acts as the
+    // wall yields a tenth of the other millimetre.
     assert!((0.8e-3..1e-3).contains(&slip), "the hand's other millimetre is slip: {slip} m");
 }
 

@@ -59,7 +59,7 @@ fn what_was_settled_is_fed_forward_and_the_hand_feels_less() {
     assert!(settled.names.iter().all(|name| has(&name.class[0])), "{:?}", patched.effects);
 }
 
-/// A lag of 0.2 ms, which the first round does not tell from a delay.
+/// A lag of 0.2 ms, which the first round does not distinguish from a delay.
 const LATE: &str = r#"format = 1
 kind = "rotary"
 model = { inertia = 1.4e-6, viscous = 1.2e-6, coulomb = 4.0e-4 }

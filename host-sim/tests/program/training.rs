@@ -45,7 +45,7 @@ fn a_venepuncture_is_scored_and_debriefed() {
     refused(&run(&["debrief", "/no/such.mcap", "--out", text(&out)]), 2, &["/no/such.mcap"]);
 }
 
-/// A needle driven through the far wall and beside the patient's angle, against the scripted
+/// A needle driven through the far wall and off the patient's angle, compared with the scripted
 /// venepuncture.
 #[test]
 fn a_trainee_is_compared_with_an_expert() {

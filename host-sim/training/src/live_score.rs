@@ -12,12 +12,12 @@ use link::frames::EventKind;
 use recording::messages::Hello;
 use recording::stretches::Stretch;
 
-/// Samples kept while the needle is outside: an event may be told a moment before or after its
+/// Samples kept while the needle is outside: an event may be reported a moment before or after its
 /// samples. 0.5 s.
 const OUTSIDE: usize = TICK_HZ as usize / 2;
 /// An insertion that takes longer than five minutes is left to the recording.
 const LONGEST: usize = 300 * TICK_HZ as usize;
-/// Tasks kept of an insertion and of the time before it; a page may tell of any number.
+/// Tasks kept of an insertion and of the time before it; a page may report any number.
 const MOST_TASKS: usize = 1_000;
 
 /// The insertion in progress.
@@ -92,7 +92,7 @@ impl LiveScore {
             see(span, judge.insertion(span));
         }
         begin_at(stretch, left + 1);
-        // What was done before this insertion ended is not told of the next one.
+        // Tasks that were done before this insertion ended do not count for the next one.
         stretch.tasks.retain(|task| task.tick > left);
     }
 }

@@ -51,7 +51,8 @@ pub(super) fn read(file: &str, bytes: &[u8]) -> Result<Log, Error> {
     tables_of(file, found.topics, notes)
 }
 
-/// The tables of the topics that are read, and notes on the others; an error where there is none.
+/// Returns the tables of the topics that are read, and notes on the others; an error if no topic is
+/// read.
 fn tables_of(file: &str, topics: BTreeMap<u16, Topic>, mut notes: Vec<String>) -> Result<Log, Error> {
     if topics.values().any(|t| t.name == "/setup") && topics.values().any(|t| t.name == "/samples") {
         return Err(Error::input(format_args!(

@@ -147,7 +147,7 @@ impl<'a> Bytes<'a> {
         let Some(first) = self.u32(0) else { return Ok(None) };
         let (kind, from, size) = match first >> 16 {
             0 => (first, 8, self.u32(4).ok_or(SHORT)? as usize),
-            // Four bytes or less stand in the tag.
+            // Data of at most four bytes is in the tag itself.
             size => (first & 0xffff, 4, size as usize),
         };
         let data = self.left.get(from..from + size).ok_or(SHORT)?;

@@ -88,8 +88,8 @@ impl Names {
         Self(found)
     }
 
-    /// The name of an element of a list. They stand in a list, or in one within an object of one
-    /// key.
+    /// Returns the name of an element of a list. The names are in a list, or in a list within an
+    /// object of one key.
     fn of(&self, column: &str, element: usize) -> Option<&str> {
         let names = self.0.as_ref()?.get("features")?.get(column)?.get("names")?;
         let list = names.as_array().or_else(|| names.as_object()?.values().next()?.as_array())?;

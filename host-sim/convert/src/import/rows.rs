@@ -27,7 +27,7 @@ pub(super) struct Rows {
 /// The caller's knowledge in addition to the columns.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Known {
-    /// Rows a second, where no column tells the time.
+    /// Rows per second, if no column gives the time.
     pub rate_hz: Option<f64>,
     /// True if nothing drives the axis: the command is zero.
     pub undriven: bool,
@@ -131,7 +131,7 @@ pub(super) fn is_whole(logs: &[Log], choices: &[Choice], known: Known) -> bool {
     })
 }
 
-/// The rows of a recording whose columns stand in `logs`.
+/// Returns the rows of a recording whose columns are in `logs`.
 pub(super) fn gather(
     logs: &[Log],
     choices: &[Choice],
@@ -191,7 +191,8 @@ pub(super) fn gather(
     Ok(rows)
 }
 
-/// Leaves out a speed beside a position: most are its difference, and no measurement.
+/// Leaves out a velocity if there is a position: most velocities are differences of the position,
+/// not measurements.
 fn leave_out_velocity(logs: &[Log], found: &mut BTreeMap<Role, Chosen>, notes: &mut Vec<String>) {
     if found.contains_key(&Role::Position)
         && let Some(left) = found.remove(&Role::Velocity)
@@ -236,7 +237,8 @@ fn missing(logs: &[Log], found: &BTreeMap<Role, Chosen>, known: Known) -> Vec<St
 }
 
 impl Rows {
-    /// Notes what a column measures; a velocity tells what the position is where no column is one.
+    /// Stores the quantity of a column. If no column is a position, a velocity gives the quantity
+    /// of the position.
     fn set_quantity(&mut self, role: Role, quantity: Quantity, has_position: bool) {
         match role {
             Role::Position => self.position = quantity,

@@ -34,7 +34,7 @@ fn slice(rows: &Rows, from: usize, to: usize) -> Rows {
     pick(rows, |i| (from..to).contains(&i))
 }
 
-/// The column that tells the motion.
+/// Returns the column that gives the motion.
 fn motion(rows: &Rows) -> Role {
     if rows.columns.contains_key(&Role::Position) { Role::Position } else { Role::Velocity }
 }

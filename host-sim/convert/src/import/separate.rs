@@ -42,11 +42,11 @@ pub(super) fn check(logs: &[Log], wholes: &[Rows]) -> Result<(), Error> {
 
 #[derive(Debug, PartialEq)]
 enum Clocks {
-    /// They tell two runs.
+    /// They distinguish two runs.
     Apart,
-    /// Dates tell that both were recorded at once.
+    /// Their dates show that both were recorded at once.
     SameTime,
-    /// They do not tell.
+    /// They do not decide it.
     Unknown,
 }
 
@@ -67,7 +67,7 @@ fn compare(a: &Rows, b: &Rows) -> Clocks {
     if (a - b).abs() > ANOTHER_LENGTH * a.max(b) { Clocks::Apart } else { Clocks::Unknown }
 }
 
-/// True if two names differ only in what people tell runs apart by: numbers, single letters, words
+/// True if two names differ only in what people distinguish runs by: numbers, single letters, words
 /// such as `fit` and `holdout`.
 fn names_are_of_runs(a: &str, b: &str) -> bool {
     let words = |file: &str| {

@@ -2,7 +2,7 @@
 
 use super::units::{self, Unit};
 
-/// A column of numbers; NaN where there is none.
+/// A column of numbers; a missing value is NaN.
 #[derive(Clone, Debug)]
 pub(super) struct Column {
     /// As the file has it.

@@ -8,7 +8,7 @@ use device_sim::error::Error;
 const SEPARATORS: [(char, &str); 5] =
     [(';', "semicolons"), ('\t', "tabs"), (',', "commas"), ('|', "bars"), (' ', "spaces")];
 const COMMENTS: [&str; 4] = ["#", "%", "//", "!"];
-/// Lines from which the layout is told.
+/// The number of lines from which the layout is recognised.
 const SAMPLE: usize = 200;
 
 /// Text from bytes: UTF-8, UTF-16 with its mark, else Latin-1, which German and French instruments

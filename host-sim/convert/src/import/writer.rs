@@ -27,8 +27,8 @@ fn value(x: Option<f64>, unit: &str, what: &str) -> String {
     }
 }
 
-/// The text of `rig.toml`. Values that no recording tells are `nan`, which `diagnose` refuses until
-/// they are filled in.
+/// Returns the text of `rig.toml`. Values that no recording gives are `nan`, which `diagnose`
+/// refuses until they are filled in.
 pub(super) fn rig(name: &str, rows: &Rows, scale: Scale, known: &RigValues) -> String {
     let linear = rows.position == Quantity::Length;
     let (kind, force, mass, length) =

@@ -142,7 +142,7 @@ impl Outcome {
         ]
     }
 
-    /// The device's part as a file, with what was found beside it.
+    /// Returns the device's part as a file, with the findings as comments.
     pub fn to_toml(&self, name: &str) -> Result<String, Error> {
         let found: String = self.lines().iter().map(|line| format!("# {line}\n")).collect();
         Ok(found + &device_config::to_toml(name, &self.record)?)
@@ -155,7 +155,8 @@ impl From<CommissioningError> for Error {
     }
 }
 
-/// Commissions the device behind `line`; `ask` is told each step before it is done, and may end it.
+/// Commissions the device behind `line`; `ask` is called with each step before it is done, and may
+/// end it.
 pub async fn commission(
     line: &mut dyn Line,
     wish: &Wish,

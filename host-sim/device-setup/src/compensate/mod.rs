@@ -114,10 +114,10 @@ impl Default for Wish {
     }
 }
 
-/// Compensates the device behind `line` for what `rig` found; `ask` is told each step before it is
-/// done, and may end it. No phase is felt more afterwards than before, and all together are felt
-/// less: what makes one worse is taken back. Where it ends early, the device is given back what it
-/// had before.
+/// Compensates the device behind `line` for what `rig` found; `ask` is called with each step before
+/// it is done, and may end it. Afterwards a hand feels no phase more than before, and it feels less
+/// over all phases together: a part that makes a phase worse is taken back. If it ends early, the
+/// device gets back what it had before.
 pub async fn compensate(
     line: &mut dyn Line,
     rig: &Rig,

@@ -1,7 +1,7 @@
-//! The picture's tissue beside the virtual device: how far its surface is displaced where the
-//! needle goes in. By choice, and off by default, the force law of Paper 000 counts depth from
-//! there (its force function takes "position and velocity of the interacting objects" from
-//! position-based dynamics).
+//! The picture's tissue, simulated with the virtual device: it gives the displacement of the
+//! surface where the needle goes in. As an option, which is off by default, the force law of Paper
+//! 000 counts depth from that surface (its force function takes "position and velocity of the
+//! interacting objects" from position-based dynamics).
 //!
 //! The surface is taken at four points one spacing of the grid around the entry: the pierced place
 //! itself goes with the needle, and a depth past it would be zero until the skin gives way. This is
@@ -35,7 +35,8 @@ pub(super) struct Deformed {
 }
 
 impl Deformed {
-    /// At rest, with the walls of this patient; in a sentence why there is none.
+    /// Returns the tissue at rest, with the walls of this patient, or a sentence that says why it
+    /// cannot be made.
     pub(super) fn new(profile: &Profile) -> Result<Self, String> {
         let patient = &profile.config.patient;
         if !matches!(patient.law, Law::Xr(_)) {

@@ -27,7 +27,7 @@ pub struct DeviceConfig {
     pub name: String,
     /// As the control law takes it, checked.
     pub device: Device,
-    /// Under which the device has told it, where one has.
+    /// The seal under which a device reported it, if one did.
     seal: Option<u32>,
     /// The force that its rollers hold, if measured.
     pub grip: Option<Grip>,
@@ -63,8 +63,8 @@ impl DeviceConfig {
     }
 }
 
-/// The text of a device's part as the device told it, which [`DeviceConfig::parse`] reads again to
-/// the last place.
+/// Returns the text of a device's part as the device reported it. [`DeviceConfig::parse`] reads the
+/// same values from it, to the last digit.
 pub fn to_toml(name: &str, record: &Record) -> Result<String, Error> {
     toml::to_string(&File::new(name, record)).map_err(Error::failed)
 }
@@ -77,7 +77,7 @@ struct File {
     /// As `commission` writes it; without it, the device refuses to start.
     #[serde(default)]
     commissioned: bool,
-    /// As the device told it: by this it knows its own record again.
+    /// The seal as the device reported it, by which the device recognises its own record.
     seal: Option<u32>,
     #[serde(default)]
     drive: Drive,

@@ -60,7 +60,7 @@ pub struct VirtualDevice {
     turned_rad: f64,
     /// The step of the procedure that is going on, as soon as it has begun.
     step: Option<usize>,
-    /// Tasks that the scripted hand has done and nobody has been told of.
+    /// Tasks that the scripted hand has done and that have not been reported yet.
     done: Vec<String>,
     set_value: f64,
     enable: bool,

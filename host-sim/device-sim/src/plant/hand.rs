@@ -22,7 +22,7 @@ pub struct Grip {
     pub seed: u64,
 }
 
-/// A hand and where its tremor stands.
+/// A hand and the phase of its tremor.
 #[derive(Clone, Debug)]
 pub struct Hand {
     grip: Grip,

@@ -50,7 +50,7 @@ impl PlantConfig {
     pub fn new(roller_radius: f64, counts_per_turn: u16, full_scale_torque: f64) -> Self {
         Self {
             motor: Motor::re25(full_scale_torque),
-            // Rotor 1.1e-6 kg·m² (RE25), an aluminium roller beside it.
+            // The rotor's 1.1e-6 kg·m² (RE25) plus an aluminium roller.
             inertia: 1.4e-6,
             bearing: Bearing { viscous: 1.2e-6, coulomb: 4.0e-4, breakaway: 4.8e-4 },
             roller_radius,

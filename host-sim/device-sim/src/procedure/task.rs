@@ -1,6 +1,6 @@
-//! The tasks that a person does beside moving the needle (tourniquet, plunger, catheter): those
-//! that a procedure asks for, in which order, where the tip has to be, and which mistakes are
-//! critical. The device has no plunger: a page's button or the scripted hand tells of each.
+//! The tasks that a person does in addition to moving the needle (tourniquet, plunger, catheter):
+//! those that a procedure asks for, their order, where the tip has to be, and which mistakes are
+//! critical. The device has no plunger: a page's button or the scripted hand reports each task.
 
 use serde::{Deserialize, Serialize};
 

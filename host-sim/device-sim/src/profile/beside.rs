@@ -1,6 +1,6 @@
-//! `[[beside]]` of a patient: structures beside the usual way of the needle that it is to spare,
-//! such as a vein. They are drawn and scored; the force does not change in them, because the layers
-//! of the device go on for ever.
+//! `[[beside]]` of a patient: structures next to the usual way of the needle that it is to spare,
+//! such as a vein. They are drawn and scored. The force does not change in them, because the
+//! device's layers have no end along the skin.
 
 use crate::session::SceneBeside;
 use serde::Deserialize;

@@ -10,7 +10,7 @@ use anatomy::{Body, Line, Piece, Place, Site, Tissue};
 use control_core::config::MAX_LAYERS;
 use serde::Deserialize;
 
-/// Thinner pieces of a line are not told to the device, mm.
+/// Pieces of a line that are thinner than this are not sent to the device, mm.
 const THINNEST_MM: f64 = 0.2;
 /// The length of the needle's line that is asked for layers, mm: within the device's travel, a
 /// wall's puncture included.

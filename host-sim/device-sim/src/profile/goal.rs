@@ -59,9 +59,9 @@ impl Written {
 /// The number of a layer that the needle's line does not meet.
 const NOT_MET: u8 = u8::MAX;
 
-/// Returns the goal of the file, else the lumen of the vessel. Without such a layer there is none,
-/// or, where `may_miss` because the line through a body need not meet it, one that cannot be
-/// reached.
+/// Returns the goal of the file, or the lumen of the vessel if the file gives no goal. Without such
+/// a layer the result is `None`. If `may_miss` is true, because the line through a body need not
+/// meet the layer, the result is instead a goal that cannot be reached.
 pub(super) fn goal(
     written: Option<Written>,
     patient: &Patient,

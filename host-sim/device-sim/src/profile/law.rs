@@ -68,7 +68,7 @@ fn after_puncture() -> f64 {
 pub(super) enum Table {
     /// Its friction is in `[friction]`.
     Jog {},
-    /// The polynomials of its walls and the forces of cutting stand in the layers.
+    /// The polynomials of its walls and its cutting forces are in the layers.
     Sparte {
         tracking_n_per_mm: f64,
         relax_ms: u16,

@@ -55,13 +55,13 @@ pub struct Profile {
     pub config: Config,
     /// The same, checked.
     pub plan: Plan,
-    /// Whom it stands for.
+    /// The person whom it represents.
     pub person: Person,
     /// The default procedure of a scripted hand.
     pub procedure: String,
     /// Layers, by their numbers, that the needle is to spare.
     pub spared: Vec<u8>,
-    /// Structures beside the way that the needle is to spare.
+    /// Structures next to the needle's way that it is to spare.
     pub beside: Vec<Beside>,
     /// The body that its layers come from, if it has one.
     pub body: Option<InBody>,

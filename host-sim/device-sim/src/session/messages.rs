@@ -81,8 +81,8 @@ pub struct LinkStatus {
     pub replay: Option<ReplayStatus>,
     /// The share of the device's compensation in force, 0 to 1; none where it compensates nothing.
     pub compensation: Option<f64>,
-    /// Samples that the one who is told this was too slow for; they are in the recording all the
-    /// same.
+    /// The number of samples that were skipped because this receiver was too slow; they are still
+    /// in the recording.
     pub skipped_samples: u64,
 }
 
@@ -148,7 +148,7 @@ pub struct ProbeView {
     pub azimuth_rad: f64,
     /// Its lean from the perpendicular, rad.
     pub lean_rad: f64,
-    /// Share of the needle in tissue that lies in the image's plane, 0 to 1.
+    /// Share of the needle in tissue that is in the image's plane, 0 to 1.
     pub share_in_plane: f64,
     /// True if the image shows the tip.
     pub tip_seen: bool,

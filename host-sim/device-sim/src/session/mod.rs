@@ -29,7 +29,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak, mpsc};
 const WAITING_SAMPLES: usize = 20_000;
 /// Poses that wait for a slow subscriber: 2 s.
 const WAITING_POSES: usize = 2_000;
-/// Events that wait for a slow subscriber, and that a new one is told of.
+/// The number of events that are kept for a slow subscriber, and that a new one receives.
 const WAITING_EVENTS: usize = 256;
 
 /// A running device as the visualizer sees it. Cheap to clone.
@@ -117,7 +117,8 @@ fn teach(events: &mut VecDeque<Happening>, pose: &Pose) {
 }
 
 impl Session {
-    /// A new looker; it is told the last hello and the last events at once. Any number may look.
+    /// Adds a subscriber, which receives the last hello and the last events at once. Their number
+    /// is not limited.
     pub fn subscribe(&self) -> Subscription {
         let mut state = lock(&self.hub.state);
         let buffer = Arc::new(Mutex::new(Buffer {
@@ -287,7 +288,8 @@ impl Publisher {
         self.each(|buffer| buffer.practice = Some(practice.clone()));
     }
 
-    /// An insertion that has ended, with its verdict, as JSON. A new looker is told of all of them.
+    /// Publishes an insertion that has ended, with its verdict, as JSON. A new subscriber receives
+    /// all of them.
     pub fn attempt(&self, attempt: &Value) {
         lock(&self.hub.state).attempts.push(attempt.clone());
         self.each(|buffer| buffer.attempts.push(attempt.clone()));

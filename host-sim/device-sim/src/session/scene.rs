@@ -36,7 +36,7 @@ pub struct Scene {
     /// The body that the layers come from; without it they are slabs that go on for ever.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub body: Option<SceneBody>,
-    /// Structures beside the way that the needle is to spare.
+    /// Structures next to the needle's way that it is to spare.
     pub beside: Vec<SceneBeside>,
     /// The needle, the same for every picture.
     pub needle: SceneNeedle,

@@ -150,7 +150,7 @@ impl<'a> Sequencer<'a> {
         self.phase == Phase::Over || self.error.is_some()
     }
 
-    /// The recording, or why there is none.
+    /// Returns the recording, or the error that prevented it.
     pub fn finish(self) -> Result<Track, Error> {
         if let Some(error) = self.error {
             return Err(error);

@@ -10,7 +10,8 @@ use bench::Line;
 use device_setup::pause::block_on;
 use device_sim::error::Error;
 
-/// Commissions the device behind `line`; `ask` is told each step before it is done, and may end it.
+/// Commissions the device behind `line`; `ask` is called with each step before it is done, and may
+/// end it.
 pub fn commission(
     line: &mut dyn Line,
     wish: &Wish,

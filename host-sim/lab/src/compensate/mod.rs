@@ -24,8 +24,8 @@ pub fn read_report(dir: &Path) -> Result<Rig, Error> {
     Rig::read(&path).map_err(Error::input)
 }
 
-/// Compensates the device behind `line` for what `rig` found; `ask` is told each step before it is
-/// done, and may end it.
+/// Compensates the device behind `line` for what `rig` found; `ask` is called with each step before
+/// it is done, and may end it.
 pub fn compensate(
     line: &mut dyn Line,
     rig: &Rig,

@@ -1,4 +1,4 @@
-//! Before and after, as a page that needs nothing beside it.
+//! Before and after, as a page that needs no other file.
 
 use super::Outcome;
 use super::residual_force::{PARTS, ResidualForce};

@@ -12,7 +12,8 @@ use std::path::Path;
 const SHORTEST_MM: f64 = 1.0;
 /// A needle drawn back by this much is no longer on its way in, mm.
 const DRAWN_BACK_MM: f64 = 1.0;
-/// Speed is told over this time, s: long against an encoder's step, short against a way in.
+/// Speed is found over this time, s: long compared with an encoder's step, short compared with a
+/// way in.
 const SPEED_S: f64 = 0.1;
 /// The largest share by which the needle may be slower or faster than the way's median; beyond it
 /// is a beginning, an end, or a jump at a puncture.

@@ -68,8 +68,8 @@ pub struct Fit {
     pub judged: Vec<Judgement>,
 }
 
-/// Fits the table to `insertions`. It is judged by `unseen`; where there is none, by each insertion
-/// in its turn, left out. None where there is nothing to fit.
+/// Fits the table to `insertions`. It is judged by `unseen`, or, if that is empty, by each
+/// insertion in turn, left out of the fit. Returns `None` if there is nothing to fit.
 pub fn fit(insertions: Vec<Insertion>, unseen: &[Insertion]) -> Option<Fit> {
     let table = fit_table(&insertions)?;
     let judged = if unseen.is_empty() {

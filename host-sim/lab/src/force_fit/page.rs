@@ -1,4 +1,4 @@
-//! Measured against fitted, as a page that needs nothing beside it.
+//! Measured against fitted, as a page that needs no other file.
 
 use super::table::{Cell, Origin};
 use super::{Fit, Judgement};
@@ -50,7 +50,7 @@ pub fn html(fit: &Fit) -> String {
 
 fn design_head(fit: &Fit) -> Vec<&'static str> {
     let mut head = vec!["angle"];
-    // One header a speed; the speeds themselves stand in the first row.
+    // One empty header per speed; the speeds themselves are in the first row.
     head.extend(fit.table.speeds_mm_s.iter().map(|_| ""));
     head
 }

@@ -209,15 +209,15 @@ impl Separable {
         let (Some(g), Some(h)) = (self.speeds[s], self.angles[a]) else {
             return Some(Cell { force: nearest.clone(), origin: Origin::Nearest });
         };
-        // A measured curve of the same angle keeps what that angle does to the shape, which no
-        // factor can tell.
+        // A measured curve of the same angle keeps the effect of that angle on the shape, which no
+        // factor can represent.
         let beside = there().filter(|(s2, a2, _)| *a2 == a && self.speeds[*s2].is_some());
         let Some((s2, _, shape)) = beside.min_by_key(|(s2, ..)| s.abs_diff(*s2)) else {
             let forces_n = self.base.iter().map(|n| n * (g + h).exp()).collect();
             return Some(Cell { force: Curve { forces_n, ..nearest.clone() }, origin: Origin::Separable });
         };
         let factor = (g - self.speeds[s2].unwrap_or(g)).exp();
-        // How much deeper a knot lies at this speed than at that one, at an angle where both were
+        // How much deeper a knot is at this speed than at that one, at an angle at which both were
         // measured.
         let both =
             (0..fitted[s].len()).find_map(|a2| Some((fitted[s][a2].as_ref()?, fitted[s2][a2].as_ref()?)));

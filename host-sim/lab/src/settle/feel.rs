@@ -22,8 +22,8 @@ pub struct Feel {
 }
 
 /// Feeds forward what `rig` has beyond its plain values, and writes the page and the device's part
-/// beside `settle.html`; the roller has a radius of `radius_mm`. The sentence where nothing is fed
-/// forward.
+/// next to `settle.html`; the roller has a radius of `radius_mm`. Returns a sentence with the
+/// reason if nothing is fed forward.
 ///
 /// # Errors
 /// A sentence if it ends after the roller has moved, for whatever reason, or a file cannot be

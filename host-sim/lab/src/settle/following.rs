@@ -97,7 +97,8 @@ fn is_settled(report: &Report, settled: &Settled, least_rounds: usize) -> Option
     })
 }
 
-/// The next round after `rounds`, or why there is none; `left_s` is the motion that is left.
+/// Returns the next round after `rounds`, or the reason why no round follows; `left_s` is the
+/// remaining motion, s.
 fn next(
     limited: &Limited,
     report: &Report,

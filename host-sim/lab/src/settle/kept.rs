@@ -1,9 +1,9 @@
 //! Names that a round keeps of the round before.
 //!
 //! A diagnosis names an effect only if it is a material part of the force in all recordings
-//! together. An input that was designed to tell rivals apart need not show the effect large: with
-//! it the effect becomes a smaller part, while there is more evidence for it. So a small part takes
-//! no name back, and rivals and the model without the effect do.
+//! together. An input that was designed to distinguish rivals need not make the effect large: with
+//! it the effect becomes a smaller part, while there is more evidence for it. So a small part does
+//! not take a name back; rivals and the model without the effect do.
 
 use super::Name;
 

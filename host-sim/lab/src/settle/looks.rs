@@ -14,9 +14,9 @@ const SPENT: f64 = 0.5;
 /// Names of the last round with a confidence that counts the looks of a run of at most `most`
 /// rounds, and those that are then too unsure to be names.
 ///
-/// A run could have stopped for a name in the round since which the name stands. An error is spent
-/// on each round in turn (a union bound): if each name's error is no more than its share, the run's
-/// errors together are no more than that.
+/// A run could have stopped for a name in the round since which every round gives it. An error is
+/// spent on each round in turn (a union bound): if each name's error is no more than its share, the
+/// run's errors together are no more than that.
 pub(super) fn corrected(rounds: &[Vec<Name>], most: usize) -> (Vec<Name>, Vec<Name>) {
     let Some(last) = rounds.last() else { return (Vec::new(), Vec::new()) };
     let counted = |name: &Name| {

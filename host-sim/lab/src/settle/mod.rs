@@ -125,8 +125,8 @@ struct Asked {
     design: Option<Box<Design>>,
 }
 
-/// Settles the diagnosis of a device whose simulation is `rig`. `progress` is told each round and
-/// each step of the compensation before the motor moves, and may end the run there.
+/// Settles the diagnosis of a device whose simulation is `rig`. `progress` is called with each
+/// round and each step of the compensation before the motor moves, and may end the run there.
 ///
 /// # Errors
 /// A sentence if an input is refused before it starts, a fault or a person ends a recording, or
@@ -145,7 +145,7 @@ pub fn settle(
         let so_far = std::mem::take(&mut settled.conclusion);
         let so_far = if so_far.is_empty() { so_far } else { format!("{so_far}; ") };
         settled.conclusion = format!("{so_far}it ended early: {error}");
-        // The reason why it ended is the one to tell.
+        // The error that ended the run is the one to report.
         let _ = page::write(&settled, &settings.out);
     }
     outcome?;
@@ -208,7 +208,7 @@ impl Run<'_> {
                 Ok(outcome) => outcome,
                 Err(error) if number == 1 => return Err(error),
                 Err(error) => {
-                    // The names of the round before stand.
+                    // The names of the round before remain valid.
                     settled.conclusion = format!("the recordings of round {number} cannot be used: {error}");
                     settled.discarded_s = asked.programmes.iter().map(Programme::seconds).sum();
                     return Ok(());
@@ -307,7 +307,7 @@ fn diagnosed(
     // A diagnosis cannot be ended half-way: who stops is heard before the next movement.
     let shared = Mutex::new(progress);
     let shows = |_: &str, part: f64| {
-        // Its beginning has been told.
+        // Its beginning has been reported.
         if let Some(mut progress) = shared.lock().ok().filter(|_| part > 0.0) {
             let _ = progress(Progress::Diagnoses(part));
         }

@@ -7,7 +7,7 @@ use diagnosis::effects::EffectName;
 pub struct Name {
     /// Its name.
     pub name: String,
-    /// Names that the recordings cannot tell from it, itself included.
+    /// Names that the recordings cannot distinguish from it, itself included.
     pub class: Vec<String>,
     /// Probability that the class holds the truth; in the outcome of a run, with all its looks
     /// counted.

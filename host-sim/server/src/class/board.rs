@@ -18,7 +18,7 @@ const MOST_MEMBERS: usize = 200;
 const MOST_EVENTS: usize = 8;
 /// A device that says nothing for so long is gone.
 const SILENCE: Duration = Duration::from_secs(2);
-/// A tip that stands still in the body for longer than this is stuck, s.
+/// A tip that does not move in the body for longer than this is stuck, s.
 const STUCK_S: f64 = 20.0;
 /// So many insertions in a row without reaching the vessel, or through its far wall, are stuck.
 const STUCK_INSERTIONS: u32 = 3;

@@ -1,5 +1,5 @@
 //! The messages of a device to its class: JSON under the Zenoh key `needle/CLASS/DEVICE/KIND`.
-//! Units stand in the names.
+//! Units are in the names.
 
 use crate::streams::NeedlePose;
 use device_sim::page::messages::Event;

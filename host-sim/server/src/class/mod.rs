@@ -117,11 +117,11 @@ mod without {
     use std::convert::Infallible;
     use std::sync::Arc;
 
-    /// A device in a class: there is none in this build.
+    /// A device in a class; it cannot be made in this build.
     #[derive(Debug)]
     pub struct Membership(#[allow(dead_code, reason = "cannot be made")] Infallible);
 
-    /// The instructor's end: there is none in this build.
+    /// The instructor's end; it cannot be made in this build.
     #[derive(Debug)]
     pub struct Listener(#[allow(dead_code, reason = "cannot be made")] Infallible);
 

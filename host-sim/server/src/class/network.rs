@@ -134,7 +134,8 @@ impl Publishers {
 
     fn put(&self, kind: Kind, bytes: Vec<u8>) {
         if let Some((_, publisher)) = self.0.iter().find(|(known, _)| *known == kind) {
-            // Nobody there is no error: whoever comes is told all within a second.
+            // It is not an error if nobody is there: whoever joins receives everything within a
+            // second.
             let _ = publisher.put(bytes).wait();
         }
     }

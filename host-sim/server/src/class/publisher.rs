@@ -17,7 +17,7 @@ use training::live_score::LiveScore;
 const ABOUT_PERIOD: Duration = Duration::from_secs(1);
 /// Events that an [`About`] repeats.
 const EVENTS: usize = 8;
-/// A tip that stays this near to one place stands still, mm.
+/// A tip that stays this close to one place does not move, mm.
 const STILL_MM: f64 = 1.0;
 
 /// A message to publish: JSON.
@@ -108,7 +108,7 @@ impl ClassPublisher {
 }
 
 fn push(messages: &mut Vec<Message>, kind: Kind, what: &impl Serialize) {
-    // Only a map with keys that are no strings cannot be written, and there is none.
+    // Only a map with keys that are not strings cannot be written, and no message has one.
     messages.extend(serde_json::to_vec(what).ok().map(|bytes| (kind, bytes)));
 }
 

@@ -48,7 +48,7 @@ pub struct Events {
 }
 
 impl Events {
-    /// More than a device tells between two sends of a stream that keeps up.
+    /// More events than a device reports between two sends of a stream that keeps up.
     const KEPT: usize = 64;
 
     fn add(&mut self, event: messages::Event) {
@@ -64,8 +64,8 @@ impl Events {
         self.total
     }
 
-    /// Those after the first `told`, oldest first; a stream that is far behind misses the oldest of
-    /// them.
+    /// Returns the events after the first `told`, oldest first; a stream that is far behind misses
+    /// the oldest of them.
     pub fn since(&self, told: u64) -> impl Iterator<Item = &messages::Event> {
         let new = self.total.saturating_sub(told).min(self.last.len() as u64) as usize;
         self.last.range(self.last.len() - new..)

@@ -16,7 +16,7 @@ struct Datagram<'a> {
     timestamp: f64,
     #[serde(flatten)]
     pose: &'a NeedlePose,
-    /// Lets a receiver beyond this computer tell our datagrams from others.
+    /// Lets a receiver on another computer distinguish our datagrams from others.
     #[serde(skip_serializing_if = "Option::is_none")]
     token: Option<&'a str>,
 }
@@ -35,7 +35,7 @@ pub(super) async fn serve(
             let Some(pose) = newest.borrow_and_update().pose.clone() else { continue };
             let datagram =
                 Datagram { timestamp: pose.t_s, pose: &pose, token: token.as_ref().map(Token::text) };
-            // Only a map with keys that are no strings cannot be written, and there is none.
+            // Only a map with keys that are not strings cannot be written, and no datagram has one.
             let Ok(text) = serde_json::to_vec(&datagram) else { continue };
             // Nobody may be listening: that is theirs.
             let _ = socket.send_to(&text, address).await;

@@ -30,8 +30,8 @@ const PROBE: ProbeView = ProbeView {
     share_in_plane: 0.0,
     tip_seen: false,
 };
-/// The numbers of a vessel and of its far wall, which [`Picture::new`] reads beside those of
-/// [`TISSUES`].
+/// The numbers of a vessel and of its far wall, which [`Picture::new`] reads in addition to those
+/// of [`TISSUES`].
 const VESSEL: f32 = 7.0;
 const FAR_WALL: f32 = 8.0;
 

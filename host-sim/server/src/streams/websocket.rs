@@ -42,7 +42,7 @@ pub(super) async fn serve(
 ) -> io::Result<SocketAddr> {
     let listener = TcpListener::bind(address).await?;
     let bound = listener.local_addr()?;
-    // A few more than may stream, so that one too many is told so.
+    // A few more than may stream, so that one client too many receives a reason.
     let listener = BoundedListener::new(listener, 2 * MOST_CLIENTS);
     let shared = Shared { newest, token, places: Arc::new(Semaphore::new(MOST_CLIENTS)) };
     let router = Router::new().route("/", get(connect)).route("/pose", get(connect)).with_state(shared);

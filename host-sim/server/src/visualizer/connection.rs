@@ -75,7 +75,7 @@ async fn stream_to(sink: &mut SplitSink<WebSocket, Message>, shared: &Shared) {
 }
 
 async fn send(sink: &mut SplitSink<WebSocket, Message>, message: &ToPage) -> bool {
-    // Only a map with keys that are no strings cannot be written, and there is none.
+    // Only a map with keys that are not strings cannot be written, and no message has one.
     let Ok(text) = serde_json::to_string(message) else { return false };
     matches!(timeout(SEND_TIMEOUT, sink.send(Message::Text(text.into()))).await, Ok(Ok(())))
 }

@@ -66,8 +66,8 @@ pub(super) async fn pass(
 ) -> Response {
     let headers = request.headers();
     if peer.ip().is_loopback() {
-        // What only shows a page may be asked for by anybody here; what moves or tells something,
-        // by the page alone.
+        // Anybody on this computer may ask for what only shows a page. Only the page itself may ask
+        // for what moves or reveals something.
         let is_free = !matches!(request.uri().path(), "/live" | "/debrief");
         return match is_free || is_own_page(headers, true) {
             true => next.run(request).await,
@@ -107,9 +107,10 @@ fn in_cookie(headers: &HeaderMap) -> Option<&str> {
     all.split(';').find_map(|pair| pair.trim().strip_prefix(TOKEN)?.strip_prefix('='))
 }
 
-/// Any site that a person visits may open a WebSocket to this program and would drive the motor:
-/// the browser tells where the script came from, and that has to be here. On this computer
-/// (`is_local`) the name that was asked for has to be its own.
+/// True if the page that sent the request is this program's own. Any site that a person visits may
+/// open a WebSocket to this program and could drive the motor, so the origin that the browser
+/// reports has to be this program. On this computer (`is_local`) the host that was asked for also
+/// has to be this computer.
 fn is_own_page(headers: &HeaderMap, is_local: bool) -> bool {
     let text = |name| headers.get(name).and_then(|value| value.to_str().ok());
     let Some(host) = text(header::HOST) else { return false };

@@ -82,8 +82,8 @@ fn paper_001_condition_5_initial_slope_and_its_range() {
     // It is adjusted within a range, and refused outside.
     let refused = [4.0, 5.0, 90.0, 91.0].map(|deg| profile("adult").at_angle(deg).is_err());
     assert_eq!(refused, [true, false, false, true]);
-    // Within it the slope varies while the needle is in: what lies under the skin is met where that
-    // slope has it.
+    // Within the range, the slope may vary while the needle is in: the needle meets what is under
+    // the skin at the depth that belongs to the new slope.
     let vein = number(&adult, Tissue::Vessel);
     let met_mm = |to_deg: f64| {
         let mut bench = Bench::of("adult");
@@ -181,8 +181,8 @@ fn paper_002_need_4_a_released_needle_stays() {
 
 /// Paper 002, II, need 5: "The simulator must have support for the hand, as doctors lay his/her
 /// hand in the patient's limb during the injection, to stabilize himself during the puncture." The
-/// support itself is mechanical; what the needle has to do with it is that a hand which lies still
-/// may rest there with the needle in tissue.
+/// support itself is mechanical; the requirement on the needle is that a hand which keeps still may
+/// rest there with the needle in tissue.
 #[test]
 fn paper_002_need_5_a_hand_may_rest_with_the_needle_in() {
     let mut bench = Bench::of("shoulder");

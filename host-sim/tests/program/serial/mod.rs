@@ -175,7 +175,7 @@ fn a_killed_program_leaves_a_device_without_torque() {
     child.wait().expect("it ends");
     std::thread::sleep(Duration::from_millis(500));
 
-    // Who looks next is told why.
+    // The next program that connects receives the reason.
     let mut port = live::serial::SerialPort::find(text(&path)).expect("it is there");
     let mut wire = port.open().expect("it opens");
     let mut driver = Driver::new(Profile::find("adult").expect("it is built in").config.patient);

@@ -184,7 +184,7 @@ mod tests {
         way.places.extend(gesture(&[(6.0, 30.0), (24.0, 30.0)]).places);
         let sweep = 2.0 * 6.0 * 5_f64.to_radians().sin();
         let error = way.angle_error(30_f64.to_radians()).expect("it moved");
-        // The turn itself lies on the way too, at the error it ends with: none.
+        // The turn itself is part of the way too, at the error with which it ends: zero.
         let expected = (6.0 * 100.0 / (24.0 + sweep)).sqrt();
         assert!((error.rms_deg - expected).abs() < 1e-6, "{error:?}, not {expected}");
     }

@@ -63,7 +63,7 @@ pub struct Insertion {
     pub flashbacks: u32,
     /// Layers that were open in the needle's own track when it met them again.
     pub met_in_track: u32,
-    /// Layers that gave way once more, for instance beside the track.
+    /// Layers that gave way once more, for instance next to the track.
     pub pierced_again: u32,
     /// True if the needle went through the vessel's far wall.
     pub through_far_wall: bool,
@@ -237,7 +237,7 @@ impl Judge {
         }
     }
 
-    /// Largest lateral force over `samples`, of which the first lies at the entry, N.
+    /// Returns the largest lateral force over `samples`, N; the first sample is at the entry.
     fn lateral_n(&self, samples: &[Sample]) -> Option<f64> {
         let (fixture, entry) = (self.fixture?, samples.first()?);
         let off = |sample: &Sample| (i32::from(sample.tilt_mrad) - i32::from(entry.tilt_mrad)).abs();

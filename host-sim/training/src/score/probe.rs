@@ -53,7 +53,7 @@ mod tests {
 
     #[test]
     fn the_time_at_which_the_tip_is_seen_is_counted() {
-        // From 1 to 3 s: seen from before the begin until 1.5 s, then beside the plane, seen again
+        // From 1 to 3 s: seen from before the begin until 1.5 s, then outside the plane, seen again
         // in the last 0.5 s.
         let half = shares(&[(5_000, true), (15_000, false), (25_000, true)]);
         assert_eq!(half, Some((0.5, 0.625)));

@@ -37,7 +37,7 @@ pub struct Reached {
 }
 
 /// Reads `events`, which are in their order in time, of the insertion from `begin` to `end`.
-/// `along_mm` tells where the tip was along the skin at a tick, and a tick lasts `tick_s`.
+/// `along_mm` gives the place of the tip along the skin at a tick, and a tick lasts `tick_s`.
 pub fn reached(
     events: &[Event],
     (begin, end): (u64, u64),
@@ -117,8 +117,8 @@ pub(crate) fn hit_and_spared(
     (names(hit), names(left))
 }
 
-/// Counts how often the tip came into a structure beside the way, and adds each structure's name to
-/// what was hit or spared.
+/// Counts how often the tip came into a structure next to the way, and adds each structure's name
+/// to what was hit or spared.
 pub(super) fn beside_hits(
     places: &[Place],
     beside: &[Beside],
@@ -178,7 +178,8 @@ mod tests {
         assert!(found.outcome == Outcome::Beyond && (found.time_s - 0.3).abs() < 1e-9, "{found:?}");
     }
 
-    /// First beside it, at 26 mm along the skin, then redirected to 20 mm.
+    /// The tip first passes next to the target, at 26 mm along the skin, and is then redirected to
+    /// 20 mm.
     #[test]
     fn a_target_that_ends_is_passed_beside_and_then_reached() {
         let told = [

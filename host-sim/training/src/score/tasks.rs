@@ -216,7 +216,7 @@ impl Judge {
         )
     }
 
-    /// Returns the name of the structure beside the way that the tip was in.
+    /// Returns the name of the structure next to the way that the tip was in.
     fn beside_at(&self, span: Span<'_>, tick: u64) -> Option<String> {
         let sample = span.stretch.samples.get(span.at(tick))?;
         let place = super::gesture::Place {

@@ -1,5 +1,5 @@
 //! Layers that were met again after they had given way: in the needle's own track, where they are
-//! open, or beside it, where they are whole. From the device's events alone.
+//! open, or next to it, where they are whole. They are found from the device's events alone.
 
 use link::frames::{Event, EventKind};
 
@@ -8,8 +8,8 @@ use link::frames::{Event, EventKind};
 pub struct MetAgain {
     /// Layers that were passed without giving way, because they had before: in the track.
     pub in_track: u32,
-    /// Layers that gave way once more: beside the track, or of a law whose walls close behind the
-    /// needle.
+    /// Layers that gave way once more: next to the track, or under a law whose walls close behind
+    /// the needle.
     pub whole: u32,
 }
 

@@ -7,7 +7,7 @@ use link::frames::{Event, EventKind};
 /// Which layers are what, by their numbers.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Targets {
-    /// The vessel's near wall and what lies under it.
+    /// The vessel's near wall and what is under it.
     pub vessel: Option<u8>,
     /// Its far wall.
     pub far_wall: Option<u8>,
