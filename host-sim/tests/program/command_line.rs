@@ -191,7 +191,6 @@ fn every_command_has_help_with_an_example() {
     }
 }
 
-#[cfg(unix)]
 /// Completes `host-sim sc` and `host-sim score --x` as bash does.
 #[cfg(unix)]
 #[test]
@@ -211,6 +210,7 @@ fn bash_completes_commands_and_options() {
 }
 
 /// A limit on the size of files simulates a full disk: the write fails in the same place.
+#[cfg(unix)]
 #[test]
 fn after_a_full_disk_the_recording_so_far_can_be_read() {
     let dir = folder("full");
