@@ -174,7 +174,7 @@ fn within(what: &str, value: f64, least: f64, most: f64) -> Result<(), Error> {
 async fn commission(wish: Wish, shared: Rc<RefCell<Shared>>) -> Result<Finding, Error> {
     ask(&shared, &NEEDLE_OUT, false).await?;
     let mut line = BrowserLine::new(&shared);
-    let asks = async |step: commission::Step| ask(&shared, &step, step.moves()).await;
+    let asks = async |step: commission::CommissioningStep| ask(&shared, &step, step.moves()).await;
     let outcome = commission::commission(&mut line, &wish, asks).await?;
     Ok(Finding { lines: outcome.lines(), file: outcome.to_toml("board")? })
 }
@@ -182,7 +182,7 @@ async fn commission(wish: Wish, shared: Rc<RefCell<Shared>>) -> Result<Finding, 
 async fn compensation(rig: Rig, share: f64, shared: Rc<RefCell<Shared>>) -> Result<Finding, Error> {
     ask(&shared, &NEEDLE_OUT, false).await?;
     let mut line = BrowserLine::new(&shared);
-    let asks = async |step: compensate::Step| ask(&shared, &step, step.moves()).await;
+    let asks = async |step: compensate::CompensationStep| ask(&shared, &step, step.moves()).await;
     let wish = compensate::Wish { share, ..compensate::Wish::default() };
     let outcome = compensate::compensate(&mut line, &rig, wish, asks).await?;
     let finding = Finding { lines: outcome.lines(), file: device_config::to_toml("board", &outcome.record)? };

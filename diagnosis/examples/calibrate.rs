@@ -5,38 +5,12 @@
 mod common;
 
 use common::{Random, Setup, record, rig};
+use diagnosis::effects::EffectName;
 use diagnosis::report::Named;
 use std::time::Instant;
 
-const ALL: &[&str] = &[
-    "none",
-    "parameters",
-    "random_disturbance",
-    "outside",
-    "asymmetric_friction",
-    "stribeck_friction",
-    "presliding_friction",
-    "quadratic_drag",
-    "position_dependent_friction",
-    "load_dependent_friction",
-    "friction_drift",
-    "cogging",
-    "torque_ripple",
-    "command_deadband",
-    "command_saturation",
-    "command_delay",
-    "electrical_lag",
-    "gain_drift",
-    "backlash",
-    "drive_compliance",
-    "roller_slip",
-    "mass_imbalance",
-    "tilt_gravity",
-    "position_spring",
-    "position_dependent_damping",
-    "encoder_eccentricity",
-    "missed_counts",
-];
+/// Cases of which no effect is the truth.
+const WITHOUT_EFFECT: [&str; 4] = ["none", "parameters", "random_disturbance", "outside"];
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -45,9 +19,10 @@ fn main() {
         Err(_) => vec![1.0, 0.3],
     };
     let seeds: u64 = std::env::var("SEEDS").ok().and_then(|x| x.parse().ok()).unwrap_or(1);
-    let wanted = |effect: &&&str| arguments.is_empty() || arguments.iter().any(|a| a == **effect);
+    let wanted = |effect: &&str| arguments.is_empty() || arguments.iter().any(|a| a == *effect);
     let (mut right, mut whole) = (0, 0);
-    for effect in ALL.iter().filter(wanted) {
+    let all = WITHOUT_EFFECT.into_iter().chain(EffectName::ALL.iter().map(|name| name.as_str()));
+    for effect in all.filter(wanted) {
         for (size, closed) in sizes.iter().flat_map(|size| [(*size, false), (*size, true)]) {
             for seed in 0..seeds {
                 if let Some(hit) = one(effect, size, closed, seed) {

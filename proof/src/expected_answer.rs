@@ -22,7 +22,7 @@ const ABSTAIN: &str = "abstain";
 
 /// The judgement of a case.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum Outcome {
+pub(crate) enum Judgement {
     /// The first name is right and none is false.
     Right,
     /// A name is right or acceptable, another one is false.
@@ -39,7 +39,7 @@ pub(crate) enum Outcome {
     Refused,
 }
 
-impl Outcome {
+impl Judgement {
     pub(crate) const ALL: [Self; 7] = [
         Self::Right,
         Self::RightBesideFalse,
@@ -109,32 +109,32 @@ impl ExpectedAnswer {
     }
 
     /// Judges the case.
-    pub(crate) fn judge(&self, record: &Record) -> Outcome {
-        let Ok(answer) = &record.answer else { return Outcome::Refused };
+    pub(crate) fn judge(&self, record: &Record) -> Judgement {
+        let Ok(answer) = &record.answer else { return Judgement::Refused };
         if let Some(first) = answer.effects.first() {
             let allowed = answer.effects.iter().filter(|e| self.allows(&e.name, e.judged_class())).count();
             return match allowed {
-                0 => Outcome::Wrong,
-                n if n < answer.effects.len() => Outcome::RightBesideFalse,
-                _ if holds(&self.right, &first.name, first.judged_class()) => Outcome::Right,
-                _ => Outcome::Defensible,
+                0 => Judgement::Wrong,
+                n if n < answer.effects.len() => Judgement::RightBesideFalse,
+                _ if holds(&self.right, &first.name, first.judged_class()) => Judgement::Right,
+                _ => Judgement::Defensible,
             };
         }
         if answer.refused {
-            return Outcome::Refused;
+            return Judgement::Refused;
         }
         let lists = |list: &[String], word: &str| list.iter().any(|w| w == word);
         let none = matches!(answer.verdict.as_str(), "no_mismatch" | "parameters_only");
         let says = |list: &[String]| lists(list, ABSTAIN) || none && lists(list, NONE);
         let denies = (none || answer.verdict == "random_disturbance") && !lists(&self.right, NONE);
         if says(&self.right) {
-            Outcome::Right
+            Judgement::Right
         } else if says(&self.acceptable) {
-            Outcome::Defensible
+            Judgement::Defensible
         } else if denies {
-            Outcome::Denies
+            Judgement::Denies
         } else {
-            Outcome::Silent
+            Judgement::Silent
         }
     }
 }
@@ -153,7 +153,7 @@ mod tests {
         parse(&format!("# case\tright\nx\t{right}\t{acceptable}\tsomebody\n")).unwrap().remove(0).1
     }
 
-    fn judged(belief: &ExpectedAnswer, names: &[(&str, f64)], verdict: &str) -> Outcome {
+    fn judged(belief: &ExpectedAnswer, names: &[(&str, f64)], verdict: &str) -> Judgement {
         let mut answer = says(names);
         if names.is_empty() {
             answer.verdict = verdict.into();
@@ -165,32 +165,32 @@ mod tests {
     fn every_outcome_is_reached() {
         let b = belief("coulomb_friction", "stribeck_friction,cogging");
         let (c, s, x) = (("coulomb_friction", 0.9), ("stribeck_friction", 0.9), ("backlash", 0.9));
-        assert_eq!(judged(&b, &[c, s], ""), Outcome::Right);
-        assert_eq!(judged(&b, &[c, x], ""), Outcome::RightBesideFalse);
-        assert_eq!(judged(&b, &[s], ""), Outcome::Defensible);
-        assert_eq!(judged(&b, &[s, c], ""), Outcome::Defensible);
-        assert_eq!(judged(&b, &[x, c], ""), Outcome::RightBesideFalse);
-        assert_eq!(judged(&b, &[s, x], ""), Outcome::RightBesideFalse);
-        assert_eq!(judged(&b, &[x], ""), Outcome::Wrong);
-        assert_eq!(judged(&b, &[], "unexplained"), Outcome::Silent);
-        assert_eq!(judged(&b, &[], "no_mismatch"), Outcome::Denies);
-        assert_eq!(judged(&b, &[], "random_disturbance"), Outcome::Denies);
+        assert_eq!(judged(&b, &[c, s], ""), Judgement::Right);
+        assert_eq!(judged(&b, &[c, x], ""), Judgement::RightBesideFalse);
+        assert_eq!(judged(&b, &[s], ""), Judgement::Defensible);
+        assert_eq!(judged(&b, &[s, c], ""), Judgement::Defensible);
+        assert_eq!(judged(&b, &[x, c], ""), Judgement::RightBesideFalse);
+        assert_eq!(judged(&b, &[s, x], ""), Judgement::RightBesideFalse);
+        assert_eq!(judged(&b, &[x], ""), Judgement::Wrong);
+        assert_eq!(judged(&b, &[], "unexplained"), Judgement::Silent);
+        assert_eq!(judged(&b, &[], "no_mismatch"), Judgement::Denies);
+        assert_eq!(judged(&b, &[], "random_disturbance"), Judgement::Denies);
         let mut refused = record(Key::of(Category::Null), says(&[]));
         refused.answer.as_mut().unwrap().refused = true;
-        assert_eq!(b.judge(&refused), Outcome::Refused);
+        assert_eq!(b.judge(&refused), Judgement::Refused);
         refused.answer = Err("too short".into());
-        assert_eq!(b.judge(&refused), Outcome::Refused);
+        assert_eq!(b.judge(&refused), Judgement::Refused);
     }
 
     #[test]
     fn none_is_a_verdict_and_abstaining_is_any_without_a_name() {
         let none = belief("none", "abstain,cogging");
-        assert_eq!(judged(&none, &[], "parameters_only"), Outcome::Right);
-        assert_eq!(judged(&none, &[], "unexplained"), Outcome::Defensible);
-        assert_eq!(judged(&none, &[("cogging", 0.5)], ""), Outcome::Defensible);
-        assert_eq!(judged(&none, &[("backlash", 0.5)], ""), Outcome::Wrong);
+        assert_eq!(judged(&none, &[], "parameters_only"), Judgement::Right);
+        assert_eq!(judged(&none, &[], "unexplained"), Judgement::Defensible);
+        assert_eq!(judged(&none, &[("cogging", 0.5)], ""), Judgement::Defensible);
+        assert_eq!(judged(&none, &[("backlash", 0.5)], ""), Judgement::Wrong);
         let abstain = belief("abstain", "");
-        assert_eq!(judged(&abstain, &[], "no_mismatch"), Outcome::Right);
+        assert_eq!(judged(&abstain, &[], "no_mismatch"), Judgement::Right);
     }
 
     #[test]

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use crate::baselines;
 use crate::dynamics::Bench;
-use crate::folder::{self, Brought, Truth};
+use crate::folder::{self, ExternalCase, Truth};
 use crate::judge::Record;
 use crate::key::{Category, Key};
 use crate::machines::Machine;
@@ -50,7 +50,7 @@ pub(crate) fn run(options: &Options, top: &Path, tool: &dyn Tool) -> Result<Judg
     Ok(judged)
 }
 
-fn asked_for(case: &Brought, text: &str) -> bool {
+fn asked_for(case: &ExternalCase, text: &str) -> bool {
     let hidden = match &case.truth {
         Truth::Known(key) => {
             key.category.matches(text)
@@ -61,7 +61,12 @@ fn asked_for(case: &Brought, text: &str) -> bool {
     hidden || case.id.contains(text)
 }
 
-fn run_case(case: &Brought, options: &Options, tool: &dyn Tool, scratch: &Path) -> Result<Record, String> {
+fn run_case(
+    case: &ExternalCase,
+    options: &Options,
+    tool: &dyn Tool,
+    scratch: &Path,
+) -> Result<Record, String> {
     let dir = scratch.join(&case.id);
     let out = match options.reports.as_ref().or(options.keep.as_ref()) {
         Some(reports) => reports.join(&case.id),

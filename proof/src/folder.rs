@@ -18,7 +18,7 @@ pub(crate) enum Truth {
 
 /// One case of a folder.
 #[derive(Clone, Debug)]
-pub(crate) struct Brought {
+pub(crate) struct ExternalCase {
     pub(crate) id: String,
     pub(crate) paths: Paths,
     pub(crate) truth: Truth,
@@ -28,7 +28,7 @@ pub(crate) struct Brought {
 ///
 /// # Errors
 /// One sentence: what is missing or cannot be read, and where.
-pub(crate) fn find(top: &Path) -> Result<Vec<Brought>, String> {
+pub(crate) fn find(top: &Path) -> Result<Vec<ExternalCase>, String> {
     let inner = top.join("cases");
     let cases = if inner.is_dir() { inner } else { top.to_path_buf() };
     let keys = keys(top)?;
@@ -53,10 +53,10 @@ pub(crate) fn find(top: &Path) -> Result<Vec<Brought>, String> {
     found.into_iter().map(|(id, path)| case(&id, &path, &keys)).collect()
 }
 
-fn case(id: &str, path: &Path, keys: &BTreeMap<String, Truth>) -> Result<Brought, String> {
+fn case(id: &str, path: &Path, keys: &BTreeMap<String, Truth>) -> Result<ExternalCase, String> {
     let truth =
         keys.get(id).cloned().ok_or_else(|| format!("the key does not list the case {}", path.display()))?;
-    Ok(Brought { id: id.into(), paths: paths(path)?, truth })
+    Ok(ExternalCase { id: id.into(), paths: paths(path)?, truth })
 }
 
 /// The files of the case in a folder. Where no recording is named `fit*` or `holdout*`, the last in

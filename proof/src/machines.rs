@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use crate::expected_answer::{ExpectedAnswer, Outcome};
+use crate::expected_answer::{ExpectedAnswer, Judgement};
 use crate::judge::Record;
 use crate::metrics::{BELIEVED, Reliability};
 use crate::stats::Rate;
@@ -15,7 +15,7 @@ pub(crate) struct Machine {
 }
 
 impl Machine {
-    pub(crate) fn outcome(&self) -> Outcome {
+    pub(crate) fn outcome(&self) -> Judgement {
         self.belief.judge(&self.record)
     }
 }
@@ -23,7 +23,7 @@ impl Machine {
 /// Everything that the report prints of machines.
 #[derive(Clone, Debug)]
 pub(crate) struct MachineSums {
-    /// In the order of [`Outcome::ALL`].
+    /// In the order of [`Judgement::ALL`].
     pub(crate) outcomes: [usize; 7],
     pub(crate) cases: usize,
     /// Right or defensible.
@@ -44,9 +44,9 @@ pub(crate) fn sum(machines: &[Machine]) -> MachineSums {
     let mut names = Vec::new();
     for machine in machines {
         let outcome = machine.outcome();
-        s.outcomes[Outcome::ALL.iter().position(|o| *o == outcome).unwrap_or(0)] += 1;
-        s.good.add(matches!(outcome, Outcome::Right | Outcome::Defensible));
-        s.refused.add(outcome == Outcome::Refused);
+        s.outcomes[Judgement::ALL.iter().position(|o| *o == outcome).unwrap_or(0)] += 1;
+        s.good.add(matches!(outcome, Judgement::Right | Judgement::Defensible));
+        s.refused.add(outcome == Judgement::Refused);
         for e in machine.record.effects() {
             names.push((e.confidence, machine.belief.allows(&e.name, e.judged_class())));
         }
@@ -67,14 +67,14 @@ impl MachineSums {
                 self.reliability.believed.text(),
             ],
         ];
-        for (outcome, count) in Outcome::ALL.iter().zip(self.outcomes) {
+        for (outcome, count) in Judgement::ALL.iter().zip(self.outcomes) {
             rows.push([format!("… {}", outcome.word()), "–".into(), format!("{count} of {}", self.cases)]);
         }
         rows
     }
 
     pub(crate) fn json(&self) -> Value {
-        let outcomes: serde_json::Map<String, Value> = Outcome::ALL
+        let outcomes: serde_json::Map<String, Value> = Judgement::ALL
             .iter()
             .zip(self.outcomes)
             .map(|(outcome, count)| (outcome.word().into(), json!(count)))

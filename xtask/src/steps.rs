@@ -13,7 +13,7 @@ const FUZZ_SECONDS: &str = "10";
 const LONG_FUZZ_SECONDS: &str = "600";
 
 /// A check: its name, what it shows, and what it does.
-pub(crate) struct Step {
+pub(crate) struct TestStep {
     pub(crate) name: &'static str,
     pub(crate) shows: &'static str,
     /// The longest that it may take on two idle cores, in s. A slower machine gets a remark and
@@ -23,7 +23,7 @@ pub(crate) struct Step {
 }
 
 /// In the order that finds the most for the least time.
-pub(crate) const STEPS: [Step; 14] = [
+pub(crate) const STEPS: [TestStep; 14] = [
     step("fmt", "the sources are formatted", 3.0, fmt),
     step("words", "comments and documents are in plain English", 2.0, words::check),
     step(
@@ -46,7 +46,7 @@ pub(crate) const STEPS: [Step; 14] = [
 ];
 
 /// The inner loop.
-pub(crate) const QUICK: [Step; 5] = [
+pub(crate) const QUICK: [TestStep; 5] = [
     step("fmt", "the sources are formatted", 3.0, fmt),
     step("words", "comments and documents are in plain English", 2.0, words::check),
     step(
@@ -60,7 +60,7 @@ pub(crate) const QUICK: [Step; 5] = [
 ];
 
 /// The checks that take longer than the tests may.
-pub(crate) const NIGHTLY: [Step; 9] = [
+pub(crate) const NIGHTLY: [TestStep; 9] = [
     step("slow", "the tests that take longest, marked `nightly`", 600.0, slow),
     step(
         "parquet",
@@ -82,8 +82,13 @@ pub(crate) const NIGHTLY: [Step; 9] = [
     step("proof", "the whole proof of the diagnosis", 7200.0, whole_proof),
 ];
 
-const fn step(name: &'static str, shows: &'static str, bound_s: f64, run: fn() -> Result<(), Error>) -> Step {
-    Step { name, shows, bound_s, run }
+const fn step(
+    name: &'static str,
+    shows: &'static str,
+    bound_s: f64,
+    run: fn() -> Result<(), Error>,
+) -> TestStep {
+    TestStep { name, shows, bound_s, run }
 }
 
 fn fmt() -> Result<(), Error> {

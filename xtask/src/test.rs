@@ -3,7 +3,7 @@
 
 use crate::setup;
 use crate::shell::Error;
-use crate::steps::{NIGHTLY, QUICK, STEPS, Step};
+use crate::steps::{NIGHTLY, QUICK, STEPS, TestStep};
 use std::time::Instant;
 
 /// The space that a whole run writes into an empty target folder, and room to spare; a linker on a
@@ -27,7 +27,7 @@ pub(crate) fn run(arguments: &[String]) -> Result<(), Error> {
     if quick && !names.is_empty() {
         return Err(Error::usage(format!("{QUICK_OPTION} chooses the steps itself; do not name any")));
     }
-    let all: &[Step] = if quick { &QUICK } else { &STEPS };
+    let all: &[TestStep] = if quick { &QUICK } else { &STEPS };
     let chosen = choose(all, &names, "step of the tests")?;
     setup::disk(if names.is_empty() && !quick { NEEDED_MIB } else { NEEDED_BY_A_STEP_MIB })?;
     let mut summary = Summary::default();
@@ -53,7 +53,7 @@ pub(crate) fn nightly(arguments: &[String]) -> Result<(), Error> {
 }
 
 /// The steps of `all` that `names` lists, in their own order; all of them where it lists none.
-fn choose<'a>(all: &'a [Step], names: &[&String], what: &str) -> Result<Vec<&'a Step>, Error> {
+fn choose<'a>(all: &'a [TestStep], names: &[&String], what: &str) -> Result<Vec<&'a TestStep>, Error> {
     if let Some(unknown) = names.iter().find(|name| all.iter().all(|step| step.name != name.as_str())) {
         let known: Vec<&str> = all.iter().map(|step| step.name).collect();
         return Err(Error::usage(format!(
@@ -74,7 +74,7 @@ struct Summary {
 }
 
 impl Summary {
-    fn run(&mut self, steps: &[&Step]) {
+    fn run(&mut self, steps: &[&TestStep]) {
         for step in steps {
             eprintln!("\n== {}: {}", step.name, step.shows);
             let begin = Instant::now();

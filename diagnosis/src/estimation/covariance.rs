@@ -69,13 +69,13 @@ pub(super) type Covariance<const N: usize> = [[f64; N]; N];
 
 /// One block: what the state becomes over it, what of the state its mean reading shows, and the
 /// noise that it adds.
-pub(super) struct Step<const N: usize> {
+pub(super) struct FilterStep<const N: usize> {
     pub(super) transition: [[f64; N]; N],
     pub(super) seen: [f64; N],
     noise: Covariance<N>,
 }
 
-impl<const N: usize> Step<N> {
+impl<const N: usize> FilterStep<N> {
     pub(super) fn new(track: &Observed, noise: &Noise, j: usize) -> Self {
         Self::with_rho(track, noise, j, (-track.span[j] / noise.tau).exp())
     }
@@ -149,7 +149,7 @@ pub(super) fn update<const N: usize>(
     (s, k, after)
 }
 
-pub(super) fn predict<const N: usize>(p: &Covariance<N>, step: &Step<N>) -> Covariance<N> {
+pub(super) fn predict<const N: usize>(p: &Covariance<N>, step: &FilterStep<N>) -> Covariance<N> {
     let f = &step.transition;
     let mut out = step.noise;
     if N == 3 {
@@ -204,8 +204,8 @@ pub(super) fn covariances<const N: usize>(
     let settling = settling(track);
     for j in 0..track.blocks() {
         let step = match rhos {
-            Some(rhos) => Step::<N>::with_rho(track, noise, j, rhos[j]),
-            None => Step::<N>::new(track, noise, j),
+            Some(rhos) => FilterStep::<N>::with_rho(track, noise, j, rhos[j]),
+            None => FilterStep::<N>::new(track, noise, j),
         };
         let (s, own, after) = update(&p, &step.seen, noise.reading() * track.quantum[j]);
         p = predict(&after, &step);
@@ -233,7 +233,7 @@ mod tests {
         let p = [[2.0, 0.3, -0.1], [0.3, 1.5, 0.2], [-0.1, 0.2, 0.7]];
         let transition = [[1.0, 0.4, 0.08], [0.0, 1.0, 0.4], [0.0, 0.0, 0.9]];
         let noise = [[0.01, 0.02, 0.0], [0.02, 0.03, 0.0], [0.0, 0.0, 0.04]];
-        let step = Step::<3> { transition, seen: [1.0, 0.2, 0.03], noise };
+        let step = FilterStep::<3> { transition, seen: [1.0, 0.2, 0.03], noise };
         let predicted = predict(&p, &step);
         for i in 0..3 {
             for j in 0..3 {

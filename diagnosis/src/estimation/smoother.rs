@@ -2,7 +2,7 @@
 //! smoother.
 
 use crate::estimation::covariance::{
-    Covariance, Noise, Observed, Step, initial, predict, product, times, update,
+    Covariance, FilterStep, Noise, Observed, initial, predict, product, times, update,
 };
 use crate::estimation::input::Total;
 use crate::estimation::reading_lag::LagStep;
@@ -84,7 +84,7 @@ fn filter<const N: usize>(track: &Observed, noise: &Noise, total: &Total) -> Vec
     let mut s = [0.0; N];
     s[0] = track.z[0];
     for j in 0..n {
-        let step = Step::<N>::new(track, noise, j);
+        let step = FilterStep::<N>::new(track, noise, j);
         let (dv, dq, mut dz) = (total.dv[j], total.dq[j], total.dz[j]);
         let lag = track.reading_lag.get(j);
         if let Some(LagStep { seen, .. }) = lag {
@@ -119,7 +119,7 @@ fn smooth<const N: usize>(
     let (mut adjoint, mut known) = ([0.0; N], [[0.0; N]; N]);
     for j in (0..n).rev() {
         let Filtered { state, covariance, innovation, variance, gain } = &filtered[j];
-        let step = Step::<N>::new(track, noise, j);
+        let step = FilterStep::<N>::new(track, noise, j);
         let f = &step.transition;
         if j + 1 < n {
             adjoint = transposed_times(f, &adjoint);

@@ -206,8 +206,8 @@ impl Rig {
                     "{key} is not filled in, and recordings do not show it; enter the value of your simulation"
                 ));
             }
-            if value.is_some_and(|x| !(x.is_finite() && x > 0.0 && x < 1e30)) {
-                return Err(format!("{key} must be a number above zero; correct it"));
+            if let Some(x) = value.filter(|x| !(x.is_finite() && *x > 0.0 && *x < 1e30)) {
+                return Err(format!("{key} is {x}; it must be a number above zero"));
             }
         }
         self.check_gain()?;
@@ -226,7 +226,7 @@ impl Rig {
             );
         }
         if !(gain.is_finite() && gain != 0.0 && gain.abs() < 1e30) {
-            return Err("actuator.gain must be a number other than zero; correct it".into());
+            return Err(format!("actuator.gain is {gain}; it must be a number other than zero"));
         }
         Ok(())
     }
@@ -251,8 +251,8 @@ impl Rig {
             ("uncertainty.gain", u.gain),
         ];
         for (key, value) in not_negative {
-            if value.is_some_and(|x| !(x.is_finite() && (0.0..1e30).contains(&x))) {
-                return Err(format!("{key} must be a number not below zero; correct it"));
+            if let Some(x) = value.filter(|x| !(x.is_finite() && (0.0..1e30).contains(x))) {
+                return Err(format!("{key} is {x}; it must be a number not below zero"));
             }
         }
         if self.model.gravity.is_some_and(|x| x != 0.0) && !self.encoder.absolute {
@@ -266,8 +266,8 @@ impl Rig {
             ("model.gravity", self.model.gravity),
             ("model.gravity_zero", self.model.gravity_zero),
         ] {
-            if value.is_some_and(|x| !(x.is_finite() && x.abs() < 1e30)) {
-                return Err(format!("{key} must be a finite number; correct it"));
+            if let Some(x) = value.filter(|x| !(x.is_finite() && x.abs() < 1e30)) {
+                return Err(format!("{key} is {x}; it must be a finite number"));
             }
         }
         Ok(())

@@ -220,7 +220,8 @@ fn one(out: &mut String, effect: &Named, kind: Kind) {
     }
     if effect.class.len() > 1 {
         let others: Vec<&str> = effect.class[1..].iter().map(|n| n.in_words()).collect();
-        let _ = write!(out, "<p>These recordings cannot tell it from: {}.</p>", safe(&others.join("; ")));
+        let _ =
+            write!(out, "<p>These recordings cannot distinguish it from: {}.</p>", safe(&others.join("; ")));
     }
     if let Some(next) = &effect.separating_experiment {
         let _ = write!(out, "<p class=next><b>Record next:</b> {}.</p>", safe(next));

@@ -54,19 +54,23 @@ pub(crate) fn rejection(why: &Rejection) -> String {
         }
         Rejection::Rather(what) => rather(what),
         Rejection::BesideUnknown => "a larger effect in the same model is not in the library".into(),
-        Rejection::SameJoint { other } => format!("{other} is of the same joint and explains more"),
+        Rejection::SameJoint { other } => format!("{} is of the same joint and explains more", other.in_words()),
         Rejection::InertiaChanges => {
             "gain and friction would change by the same part, as where the inertia changes".into()
         }
         Rejection::Undecided => "more effects explain it as well than a class may hold".into(),
-        Rejection::NotInPlain { found } => format!("a plain regression finds {found} and not this"),
+        Rejection::NotInPlain { found } => format!("a plain regression finds {} and not this", found.in_words()),
         Rejection::TakesOtherForce { on_fit, on_holdout } => other_force(*on_fit, *on_holdout),
         Rejection::Improbable { probability, weakness: weakest } => {
             format!("it is right with a probability of only {probability:.2}: {}", weakness(weakest))
         }
-        Rejection::Indistinguishable { from } => format!("the recordings cannot tell it from {from}"),
+        Rejection::Indistinguishable { from } => {
+            format!("the recordings cannot distinguish it from {}", from.in_words())
+        }
         Rejection::LessInSearch => "not fitted in full: other effects explained more in the search".into(),
-        Rejection::Behind { winner, z } => format!("{winner} explains more by {z:.1} standard errors"),
+        Rejection::Behind { winner, z } => {
+            format!("{} explains more by {z:.1} standard errors", winner.in_words())
+        }
     }
 }
 
@@ -160,7 +164,9 @@ pub(crate) fn reason(why: &Reason, form: Option<&str>) -> String {
             "{:.0} % of what a refit leaves is a force that swings at {hertz:.1} Hz, whatever the axis does",
             100.0 * part
         ),
-        Reason::Resembles { effect, rather: what } => format!("it resembles {effect}, but {}", rather(what)),
+        Reason::Resembles { effect, rather: what } => {
+            format!("it resembles {}, but {}", effect.in_words(), rather(what))
+        }
         Reason::Foreign(foreign) => {
             format!("{} would explain {:.0} % of it", foreign.what, 100.0 * foreign.share)
         }

@@ -14,7 +14,7 @@ use crate::numerics::linear::dot;
 use crate::numerics::linear::{Factor, Square};
 use crate::numerics::parallel;
 use crate::selection::context::FitContext;
-use crate::selection::score_statistic::{Sums, Terms, project};
+use crate::selection::score_statistic::{ScoreSums, Terms, project};
 use crate::selection::wave_ladder::{self, Means};
 use std::f64::consts::TAU;
 
@@ -132,7 +132,7 @@ impl<'a> Waves<'a> {
         terms_of(&[self], &self.places.iter().map(means).collect::<Vec<_>>()).remove(0)
     }
 
-    fn project(&self, terms: &Terms) -> Sums {
+    fn project(&self, terms: &Terms) -> ScoreSums {
         project(self.searched.fit, self.searched.residuals, terms, true)
     }
 
@@ -269,7 +269,7 @@ pub(crate) fn search(names: &[N], context: &FitContext, searched: &Searched) -> 
     found.into_iter().flatten().collect()
 }
 
-fn gain_of(sums: &Sums) -> f64 {
+fn gain_of(sums: &ScoreSums) -> f64 {
     let x = Factor::new(&sums.information).solve(&sums.score);
     let gain = 0.5 * dot(&x, &sums.score);
     if gain.is_finite() { gain } else { 0.0 }
@@ -278,7 +278,7 @@ fn gain_of(sums: &Sums) -> f64 {
 /// Picks orders one after another while each brings more than it costs; `may_join` says which may
 /// join those chosen.
 fn forward(
-    sums: &Sums,
+    sums: &ScoreSums,
     orders: usize,
     recordings: usize,
     looked: f64,
@@ -296,7 +296,7 @@ fn forward(
             }
         }
         let score: Vec<f64> = index.iter().map(|i| sums.score[*i]).collect();
-        gain_of(&Sums { information: part, score })
+        gain_of(&ScoreSums { information: part, score })
     };
     let mut chosen: Vec<usize> = Vec::new();
     let mut gain = 0.0;

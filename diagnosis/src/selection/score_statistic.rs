@@ -41,15 +41,15 @@ fn added_inputs(
     effect_inputs(track, effect, command, track.bias, || track.drive(before.as_deref()))
 }
 
-/// Sums that a score test needs: information of the terms with the model projected out, and their
+/// ScoreSums that a score test needs: information of the terms with the model projected out, and their
 /// score.
-pub(crate) struct Sums {
+pub(crate) struct ScoreSums {
     pub(crate) information: Square,
     pub(crate) score: Vec<f64>,
 }
 
 /// Projects the model out of terms. `own` gives each recording its own coefficients.
-pub(crate) fn project(fit: &Fit, residuals: &[Vec<f64>], terms: &Terms, own: bool) -> Sums {
+pub(crate) fn project(fit: &Fit, residuals: &[Vec<f64>], terms: &Terms, own: bool) -> ScoreSums {
     let k = terms.iter().map(Vec::len).max().unwrap_or(0);
     let size = if own { k * terms.len() } else { k };
     let base = fit.keys.len();
@@ -84,7 +84,7 @@ pub(crate) fn project(fit: &Fit, residuals: &[Vec<f64>], terms: &Terms, own: boo
             information.a[i * size + j] = if i == j && left < 1e-7 * before { 0.0 } else { left };
         }
     }
-    Sums { information, score }
+    ScoreSums { information, score }
 }
 
 /// The score test of an effect of a given shape.

@@ -165,7 +165,7 @@ fn evaluate_once(
         (0..model.effects.len()).map(|effect| Pattern::new(fit, model, effect, &one)).collect();
     let known: Vec<bool> = track.known_segments().collect();
     let own = |is_used: &dyn Fn(usize) -> bool| {
-        let sums = Sums::new(&one, |segment| known[segment] && is_used(segment));
+        let sums = LikelihoodSums::new(&one, |segment| known[segment] && is_used(segment));
         sums.own_values(fitted.clone(), &one, &patterns)
     };
     let whole = own(&|_| true);
@@ -223,12 +223,12 @@ impl Pattern {
 }
 
 /// Normal equations of some segments of a held-out recording, about the reference.
-struct Sums {
+struct LikelihoodSums {
     m: Square,
     b: Vec<f64>,
 }
 
-impl Sums {
+impl LikelihoodSums {
     fn new(one: &Prepared, is_used: impl Fn(usize) -> bool) -> Self {
         let p = one.columns.len();
         let (mut m, mut b) = (Square::zero(p), vec![0.0; p]);

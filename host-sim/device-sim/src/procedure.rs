@@ -79,7 +79,7 @@ struct File {
     start_mm: f64,
     entry_deg: Option<f64>,
     hand: HandFile,
-    step: Vec<Step>,
+    step: Vec<ProcedureStep>,
     #[serde(default)]
     task: Vec<Task>,
 }
@@ -97,7 +97,7 @@ struct HandFile {
 /// given; smoothly in so many seconds, or at an even speed. On the way it may turn the needle.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Step {
+struct ProcedureStep {
     name: String,
     seconds: Option<f64>,
     speed_mm_s: Option<f64>,
@@ -232,7 +232,7 @@ impl File {
     }
 }
 
-impl Step {
+impl ProcedureStep {
     /// Returns the time to go `way_mm`, s, and true if at an even speed.
     fn time(&self, way_mm: f64) -> Result<(f64, bool), String> {
         match (self.seconds, self.speed_mm_s) {

@@ -108,7 +108,7 @@ impl Case {
         };
         for (name, value) in [("travel", limits.travel), ("speed", limits.speed), ("force", limits.force)] {
             if !(value.is_finite() && value > 0.0) {
-                return Err(format!("--{name} must be a number above zero; correct it"));
+                return Err(format!("--{name} is {value}; it must be a number above zero"));
             }
         }
         let (left, floor) = (report.fit.patched.holdout, report.noise_floor);

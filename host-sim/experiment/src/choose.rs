@@ -75,9 +75,9 @@ pub struct Design {
 
 /// The sums of all ordered pairs under a segment.
 #[derive(Clone)]
-struct Sums(Vec<Vec<Option<Gram>>>);
+struct GramTable(Vec<Vec<Option<Gram>>>);
 
-impl Sums {
+impl GramTable {
     fn plus(&self, other: &Self) -> Self {
         let add = |(a, b): (&Option<Gram>, &Option<Gram>)| Some(a.as_ref()?.plus(b.as_ref()?));
         let row = |(a, b): (&Vec<_>, &Vec<_>)| a.iter().zip(b).map(add).collect();
@@ -123,7 +123,7 @@ impl Bench<'_> {
             .collect()
     }
 
-    fn sums(&self, input: &Input) -> Option<Sums> {
+    fn sums(&self, input: &Input) -> Option<GramTable> {
         let motions = self.motions(input)?;
         let rivals = &self.case.rivals;
         let gram = |i: usize, j: usize| {
@@ -131,18 +131,18 @@ impl Bench<'_> {
             (i != j).then(|| unexpected().gram())
         };
         let row = |i: usize| (0..rivals.len()).map(|j| gram(i, j)).collect();
-        Some(Sums((0..rivals.len()).map(row).collect()))
+        Some(GramTable((0..rivals.len()).map(row).collect()))
     }
 
     /// Adds segments to a first one while they pay, up to `most_s`, and one that travels if no
     /// segment does.
-    fn grown(&self, first: usize, all: &[(Segment, Sums)], most_s: f64) -> Vec<usize> {
-        let value = |sums: &Sums| criterion(&self.case.rivals, &sums.nats());
+    fn grown(&self, first: usize, all: &[(Segment, GramTable)], most_s: f64) -> Vec<usize> {
+        let value = |sums: &GramTable| criterion(&self.case.rivals, &sums.nats());
         let (mut parts, mut sums) = (vec![first], all[first].1.clone());
         let (mut now, mut seconds) = (value(&sums), all[first].0.seconds);
         let shortest_travel_s = shortest_travel_s(all);
         while parts.len() < MOST_SEGMENTS {
-            let with = |(k, (segment, own)): (usize, &(Segment, Sums))| {
+            let with = |(k, (segment, own)): (usize, &(Segment, GramTable))| {
                 let travels = segment.signal.travels() || parts.iter().any(|k| all[*k].0.signal.travels());
                 let reserve_s = if travels { 0.0 } else { shortest_travel_s };
                 let fits = seconds + segment.seconds + reserve_s <= most_s && !parts.contains(&k);
@@ -157,7 +157,7 @@ impl Bench<'_> {
             parts.push(k);
         }
         if !parts.iter().any(|k| all[*k].0.signal.travels()) {
-            let travels = |(k, (segment, own)): (usize, &(Segment, Sums))| {
+            let travels = |(k, (segment, own)): (usize, &(Segment, GramTable))| {
                 let fits = segment.signal.travels() && seconds + segment.seconds <= most_s;
                 fits.then(|| (k, value(&sums.plus(own)), segment.seconds))
             };
@@ -195,7 +195,7 @@ impl Bench<'_> {
 }
 
 /// Returns the length of the shortest segment that travels, s; infinite if no segment travels.
-fn shortest_travel_s(all: &[(Segment, Sums)]) -> f64 {
+fn shortest_travel_s(all: &[(Segment, GramTable)]) -> f64 {
     let travelling = all.iter().filter(|(segment, _)| segment.signal.travels());
     travelling.map(|(segment, _)| segment.seconds).fold(f64::INFINITY, f64::min)
 }
@@ -229,7 +229,7 @@ pub fn design(case: &Case, most_s: f64, seed: u64) -> Result<Design, String> {
         let input = Input { segments: vec![segment.clone()] };
         bench.sums(&input).map(|sums| (segment, sums))
     };
-    let all: Vec<(Segment, Sums)> = segments.into_par_iter().filter_map(judged).collect();
+    let all: Vec<(Segment, GramTable)> = segments.into_par_iter().filter_map(judged).collect();
     // A diagnosis refuses recordings of an axis at rest.
     if !all.is_empty() && !all.iter().any(|(segment, _)| segment.signal.travels()) {
         return Err(beyond("staircases and strokes, without which the axis hardly moves,"));
@@ -287,7 +287,7 @@ fn words(case: &Case) -> Limit {
 }
 
 /// Pairs that neither a segment of the library nor the chosen input distinguishes.
-fn inseparable(case: &Case, all: &[(Segment, Sums)], chosen: &Alternative) -> Vec<(String, String)> {
+fn inseparable(case: &Case, all: &[(Segment, GramTable)], chosen: &Alternative) -> Vec<(String, String)> {
     let nats: Vec<Vec<Vec<f64>>> = all.iter().map(|(_, sums)| sums.nats()).collect();
     let of_chosen = |a: &str, b: &str| {
         let is_pair =

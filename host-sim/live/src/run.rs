@@ -23,7 +23,7 @@ use recording::write::Recorder;
 use server::outlets::Outlets;
 use server::patient_manager::PatientManager;
 use server::realtime_clock::RealtimeClock;
-use server::run_loop::{Outcome, RunLoop};
+use server::run_loop::{RunLoop, RunOutcome};
 use server::saved_patients::SavedPatients;
 use server::visualizer;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
@@ -244,7 +244,7 @@ impl Run {
         serial: Option<SerialPort>,
         chosen: Chosen,
         seconds: Option<f64>,
-    ) -> Result<Outcome, Error> {
+    ) -> Result<RunOutcome, Error> {
         let mut bar = Progress::new("running");
         let progress = |samples: u64| bar.show(samples as f64 / f64::from(TICK_HZ), seconds, "s");
         if let Some(mut port) = serial {
@@ -306,7 +306,7 @@ impl Run {
         }
     }
 
-    fn report(&self, outcome: &Outcome) {
+    fn report(&self, outcome: &RunOutcome) {
         if let (Some(path), Some(bytes)) = (&self.record, outcome.recorded_bytes) {
             say!("recorded {bytes} bytes to {}", path.display());
         }

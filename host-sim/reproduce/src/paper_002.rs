@@ -15,7 +15,7 @@ use html_report::{Sheet, decimal};
 use server::virtual_run;
 use std::path::Path;
 use training::debrief::anatomy;
-use training::score::target::Outcome;
+use training::score::target::TargetOutcome;
 
 /// Cutting forces that the paper prints, N.
 const CUTTING: [(Tissue, f64); 6] = [
@@ -145,9 +145,9 @@ fn rows(profile: &Profile, traces: &[Trace]) -> Vec<Row> {
         let Some(target) = trace.target(profile) else { continue };
         let beside = if target.passed_beside > 0 { "passed beside, then " } else { "" };
         let outcome = match target.outcome {
-            Outcome::Missed => "missed",
-            Outcome::Reached => "reached",
-            Outcome::Beyond => "reached, then on to the cartilage",
+            TargetOutcome::Missed => "missed",
+            TargetOutcome::Reached => "reached",
+            TargetOutcome::Beyond => "reached, then on to the cartilage",
         };
         let paper = if beside.is_empty() {
             "all layers until the cartilage"

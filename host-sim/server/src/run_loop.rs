@@ -47,7 +47,7 @@ pub struct RunLoop<'a> {
 }
 
 /// The totals of a run.
-pub struct Outcome {
+pub struct RunOutcome {
     /// Totals of the link.
     pub link: link::host::Counts,
     /// Totals of what happened.
@@ -108,7 +108,7 @@ impl<'a> RunLoop<'a> {
         mut device: VirtualDevice,
         mut clock: RealtimeClock,
         mut progress: impl FnMut(u64),
-    ) -> Result<Outcome, Error> {
+    ) -> Result<RunOutcome, Error> {
         self.driver.connected(Duration::ZERO);
         while !self.is_over() {
             let now = lockstep::time(device.ticks());
@@ -158,7 +158,7 @@ impl<'a> RunLoop<'a> {
         port: &mut dyn Port,
         seconds: Option<f64>,
         mut progress: impl FnMut(u64),
-    ) -> Result<Outcome, Error> {
+    ) -> Result<RunOutcome, Error> {
         let begin = Instant::now();
         let mut wire: Option<Box<dyn Wire>> = None;
         let mut next_try = Duration::ZERO;
@@ -360,7 +360,7 @@ impl<'a> RunLoop<'a> {
         ))
     }
 
-    fn finish(mut self) -> Result<Outcome, Error> {
+    fn finish(mut self) -> Result<RunOutcome, Error> {
         let link = self.driver.counts();
         let recorder = self.outlets.recorder.take();
         let recorded_bytes = recorder.map(|recorder| recorder.finish(link.into())).transpose();
@@ -370,6 +370,6 @@ impl<'a> RunLoop<'a> {
         if let Some(refused) = self.driver.refused() {
             return Err(Error::failed(refused));
         }
-        Ok(Outcome { link, stats: self.outlets.stats, recorded_bytes: recorded_bytes? })
+        Ok(RunOutcome { link, stats: self.outlets.stats, recorded_bytes: recorded_bytes? })
     }
 }

@@ -9,7 +9,7 @@ use lab::characterise::mechanism::Wiring;
 use lab::characterise::{self, writer};
 use lab::commission::bench::{GuidedLine, Line, WireLine};
 use lab::commission::mechanism::VirtualLine;
-use lab::commission::{self, Outcome, Step, Wish};
+use lab::commission::{self, CommissioningOutcome, CommissioningStep, Wish};
 use live::serial::SerialPort;
 use live::serving::stop_on_signals;
 use live::{examples, say};
@@ -57,7 +57,7 @@ impl Commission {
         } else {
             self.on_port(&wish, &consent, &stop)
         };
-        consent.end(outcome.as_ref().map(Outcome::lines));
+        consent.end(outcome.as_ref().map(CommissioningOutcome::lines));
         let outcome = outcome?;
         for line in outcome.lines() {
             say!("{line}");
@@ -91,21 +91,26 @@ impl Commission {
         Ok(Wish { turns: self.turns, pull_mm: self.pull_mm, counts_per_turn: self.counts_per_turn })
     }
 
-    fn on_virtual(&self, wish: &Wish, consent: &Consent) -> Result<Outcome, Error> {
+    fn on_virtual(&self, wish: &Wish, consent: &Consent) -> Result<CommissioningOutcome, Error> {
         let scale = characterise::scale(&characterise::configuration())?;
         let rig = writer::nominal_rig(&scale);
         let line = VirtualLine::new(&rig, "the nominal rig", Wiring::default(), scale.roller_radius_mm)?;
         on(line, wish, consent)
     }
 
-    fn on_port(&self, wish: &Wish, consent: &Consent, stop: &AtomicBool) -> Result<Outcome, Error> {
+    fn on_port(
+        &self,
+        wish: &Wish,
+        consent: &Consent,
+        stop: &AtomicBool,
+    ) -> Result<CommissioningOutcome, Error> {
         let mut port = SerialPort::find(&self.device)?;
         consent.needle_is_out()?;
         on(WireLine::new(port.open().map_err(Error::failed)?, stop), wish, consent)
     }
 }
 
-fn on(line: impl Line, wish: &Wish, consent: &Consent) -> Result<Outcome, Error> {
+fn on(line: impl Line, wish: &Wish, consent: &Consent) -> Result<CommissioningOutcome, Error> {
     let mut line = GuidedLine { line, guide: consent.guide() };
-    commission::commission(&mut line, wish, |step: Step| consent.ask(&step, step.moves()))
+    commission::commission(&mut line, wish, |step: CommissioningStep| consent.ask(&step, step.moves()))
 }

@@ -8,7 +8,7 @@ use diagnosis::rig::Rig;
 use lab::characterise::{self, writer};
 use lab::commission::bench::{GuidedLine, Line, WireLine};
 use lab::commission::mechanism::VirtualLine;
-use lab::compensate::{self, Step, Wish, files};
+use lab::compensate::{self, CompensationStep, Wish, files};
 use live::serial::SerialPort;
 use live::serving::stop_on_signals;
 use live::{examples, say};
@@ -93,7 +93,7 @@ impl Compensate {
     fn on(&self, line: impl Line, rig: &Rig, consent: &Consent) -> Result<Vec<String>, Error> {
         let mut line = GuidedLine { line, guide: consent.guide() };
         if self.align {
-            consent.ask(&Step::Before, true)?;
+            consent.ask(&CompensationStep::Before, true)?;
             let angle = compensate::align(&mut line, rig)?;
             return Ok(vec![format!("angle index_counts={} agreement={:.3}", angle.count, angle.agreement)]);
         }

@@ -46,7 +46,10 @@ pub(crate) struct Experiment {
 impl Experiment {
     pub(crate) fn run(self) -> Result<(), Error> {
         if !(4.0..=MOST_S).contains(&self.seconds) {
-            return Err(Error::input("--seconds must be between 4 and 30; correct it"));
+            return Err(Error::input(format_args!(
+                "--seconds is {}; it must be from 4 to {MOST_S} seconds",
+                self.seconds
+            )));
         }
         let case = Case::read(&self.report, self.travel, self.speed, self.force).map_err(Error::input)?;
         let design = design(&case, self.seconds, self.seed).map_err(Error::input)?;

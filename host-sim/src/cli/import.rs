@@ -77,15 +77,17 @@ impl Import {
             ("--inertia", self.inertia),
         ];
         for (option, value) in positive {
-            if value.is_some_and(|x| !(x.is_finite() && x > 0.0)) {
-                return Err(Error::input(format_args!("{option} must be a number above zero; correct it")));
+            if let Some(x) = value.filter(|x| !(x.is_finite() && *x > 0.0)) {
+                return Err(Error::input(format_args!("{option} is {x}; it must be a number above zero")));
             }
         }
-        if self.gain.is_some_and(|x| !x.is_finite() || x == 0.0) {
-            return Err(Error::input("--gain must be a number other than zero; correct it"));
+        if let Some(gain) = self.gain.filter(|x| !x.is_finite() || *x == 0.0) {
+            return Err(Error::input(format_args!("--gain is {gain}; it must be a number other than zero")));
         }
-        if self.split.is_some_and(|x| !(0.1..=0.9).contains(&x)) {
-            return Err(Error::input("--split must be between 0.1 and 0.9; 0.6 is usual"));
+        if let Some(split) = self.split.filter(|x| !(0.1..=0.9).contains(x)) {
+            return Err(Error::input(format_args!(
+                "--split is {split}; it must be from 0.1 to 0.9; 0.6 is usual"
+            )));
         }
         let columns = self.column.iter().map(|text| import::choice(text)).collect::<Result<_, _>>()?;
         let done = import::import(&Request {

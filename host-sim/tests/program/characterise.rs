@@ -9,7 +9,7 @@ use diagnosis::effects::{Effect, EffectName};
 use diagnosis::report::Verdict;
 use fixed::types::{I8F24, I16F16};
 use lab::characterise::mechanism::BareDevice;
-use lab::characterise::programme::{Programme, Step};
+use lab::characterise::programme::{Programme, ProgrammeStep};
 use lab::characterise::sequencer::Sequencer;
 use lab::characterise::{self, programme, writer};
 use link::codec::{self, Decoder, MAX_FRAME};
@@ -67,20 +67,20 @@ fn mm(length: f64) -> Millimetres {
     Millimetres(I16F16::from_num(length))
 }
 
-fn step(signal: Signal, duration_ms: u32) -> Step {
+fn step(signal: Signal, duration_ms: u32) -> ProgrammeStep {
     let servo =
         Servo { stiffness: Stiffness(I16F16::from_num(0.05)), damping: Damping(I8F24::from_num(0.0005)) };
     let excitation = Excitation { signal, duration_ms, servo, travel: mm(100.0), compensated: false };
-    Step { excitation, prompt: None }
+    ProgrammeStep { excitation, prompt: None }
 }
 
-fn strokes(stroke: f64, duration_ms: u32) -> Step {
+fn strokes(stroke: f64, duration_ms: u32) -> ProgrammeStep {
     let speed = MillimetresPerSecond(I16F16::from_num(50.0));
     step(Signal::Triangle { stroke: mm(stroke), speed }, duration_ms)
 }
 
 /// Strokes to 30 mm and back to 20, ramps of torque there, and strokes from there.
-fn three_steps() -> Vec<Step> {
+fn three_steps() -> Vec<ProgrammeStep> {
     let ramps = Signal::BreakawayRamps { torque: MillinewtonMetres(I16F16::from_num(0.3)), ramp_ms: 100 };
     vec![strokes(30.0, 800), step(ramps, 400), strokes(20.0, 600)]
 }
@@ -115,8 +115,8 @@ fn steps_without_a_prompt_play_as_one_sequence() {
 #[test]
 fn a_programme_is_parted_where_one_sequence_does_not_hold_it() {
     let plan = characterise::configuration().plan().expect("sound");
-    let parts = |steps: Vec<Step>| Programme { file: "fit.csv", steps }.parts(&plan);
-    let prompted = || Step { prompt: Some("tilt"), ..strokes(10.0, 100) };
+    let parts = |steps: Vec<ProgrammeStep>| Programme { file: "fit.csv", steps }.parts(&plan);
+    let prompted = || ProgrammeStep { prompt: Some("tilt"), ..strokes(10.0, 100) };
     assert_eq!(parts(three_steps()), [3]);
     assert_eq!(parts(vec![]), [0; 0]);
     let mut with_prompt = three_steps();

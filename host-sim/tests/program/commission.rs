@@ -6,7 +6,7 @@ use diagnosis::rig::Rig;
 use lab::characterise::mechanism::{Channel, Wiring};
 use lab::characterise::{self, writer};
 use lab::commission::mechanism::VirtualLine;
-use lab::commission::{self, Outcome, Step, Wish};
+use lab::commission::{self, CommissioningOutcome, CommissioningStep, Wish};
 
 const RADIUS_MM: f64 = 12.5;
 const WISH: Wish = Wish { turns: 5, pull_mm: 100.0, counts_per_turn: None };
@@ -16,7 +16,11 @@ fn rig() -> Rig {
     writer::nominal_rig(&scale)
 }
 
-fn commission_on(rig: &Rig, wiring: Wiring, tilt: (f64, f64)) -> (Result<Outcome, Error>, Vec<Step>, Device) {
+fn commission_on(
+    rig: &Rig,
+    wiring: Wiring,
+    tilt: (f64, f64),
+) -> (Result<CommissioningOutcome, Error>, Vec<CommissioningStep>, Device) {
     let line = VirtualLine::new(rig, "the test's rig", wiring, RADIUS_MM).expect("rotary, in DAC steps");
     let mut line = line.with_tilt(tilt.0, tilt.1);
     let mut steps = Vec::new();
@@ -27,7 +31,7 @@ fn commission_on(rig: &Rig, wiring: Wiring, tilt: (f64, f64)) -> (Result<Outcome
     (outcome, steps, *line.device().plan().device())
 }
 
-fn commissioned(wiring: Wiring) -> Outcome {
+fn commissioned(wiring: Wiring) -> CommissioningOutcome {
     let (outcome, _, in_force) = commission_on(&rig(), wiring, (0.1, 1.0));
     let outcome = outcome.expect("it passes");
     assert_eq!(outcome.record.device, in_force, "the device has what was found");

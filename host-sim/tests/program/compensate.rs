@@ -52,7 +52,7 @@ fn compensation_leaves_a_quarter_of_the_found_force() {
 }
 
 /// Compensates and checks that no phase is felt more afterwards than before.
-fn compensated(found: &Rig) -> (VirtualLine, compensate::Outcome, Vec<String>) {
+fn compensated(found: &Rig) -> (VirtualLine, compensate::CompensationOutcome, Vec<String>) {
     let (mut line, mut steps) = (line(rig_hidden()), Vec::new());
     let outcome = compensate::compensate(&mut line, found, Wish::default(), |step| {
         steps.push(step.to_string());

@@ -7,7 +7,7 @@ use device_sim::error::Error;
 use diagnosis::rig::Rig;
 use lab::characterise::mechanism::BareDevice;
 use lab::commission::bench::WireLine;
-use lab::compensate::{self, Step, Wish};
+use lab::compensate::{self, CompensationStep, Wish};
 use lab::settle::{Inputs, Plant, Progress, Settings, Subject, settle};
 use link::codec::MAX_FRAME;
 use std::collections::VecDeque;
@@ -244,7 +244,7 @@ fn a_stop_while_feeding_forward_gives_back_what_the_device_had() {
     let mut steps = Vec::new();
     let ended = compensate::compensate(&mut line, &found, Wish::default(), |step| {
         steps.push(step.to_string());
-        if step == Step::After {
+        if step == CompensationStep::After {
             pressed = Some(std::thread::spawn(presses.clone()));
         }
         Ok(())
@@ -294,5 +294,5 @@ fn rounds_motion_and_length_beyond_the_most_are_refused() {
     refused(&with("--rounds", "6"), 2, &["--rounds must be 1 to 5"]);
     refused(&with("--motion", "181"), 2, &["--motion must be 20 to 180 s"]);
     let experiment = ["experiment", "--report", "unused", "--out", "unused", "--seconds", "31"];
-    refused(&run(&experiment), 2, &["--seconds must be between 4 and 30"]);
+    refused(&run(&experiment), 2, &["it must be from 4 to 30 seconds"]);
 }

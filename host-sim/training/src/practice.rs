@@ -4,7 +4,7 @@
 use crate::live_score::LiveScore;
 use crate::score::Insertion;
 use crate::score::gesture::Gesture;
-use crate::score::target::Outcome;
+use crate::score::target::TargetOutcome;
 use control_core::config::Tissue;
 use device_sim::procedure::task::Task;
 use device_sim::profile::Profile;
@@ -79,9 +79,11 @@ impl Goal {
             Goal::Structure(tissue) => {
                 let tissue = device_sim::session::tissue_name(tissue);
                 match figures.target.as_ref().map(|target| target.outcome) {
-                    Some(Outcome::Reached) => {}
-                    Some(Outcome::Beyond) => missing.push(format!("it went through the {tissue}")),
-                    Some(Outcome::Missed) | None => missing.push(format!("the {tissue} was not reached")),
+                    Some(TargetOutcome::Reached) => {}
+                    Some(TargetOutcome::Beyond) => missing.push(format!("it went through the {tissue}")),
+                    Some(TargetOutcome::Missed) | None => {
+                        missing.push(format!("the {tissue} was not reached"))
+                    }
                 }
             }
             Goal::Skin if figures.punctures == 0 => missing.push("the skin was not pierced".into()),

@@ -46,7 +46,7 @@ pub(super) fn left(nominal: &Rig, patched: &Rig, band: &Band) -> Result<f64, Str
         // Once round: a turn where it is known, else the longest wave.
         let round = nominal.turn.unwrap_or(longest).max(longest);
         let count = (PHASES * round / shortest).ceil().clamp(1.0, 2000.0) as usize;
-        let sums = Sums::of(&left, &columns, biased);
+        let sums = ResidualSums::of(&left, &columns, biased);
         for i in 0..count {
             let shift = round * i as f64 / count as f64;
             let weights: Vec<f64> = waves
@@ -65,14 +65,14 @@ pub(super) fn left(nominal: &Rig, patched: &Rig, band: &Band) -> Result<f64, Str
 
 /// Second moments of the residual and the columns of the waves, so that a shift costs no pass over
 /// the rows.
-struct Sums {
+struct ResidualSums {
     rows: f64,
     energy: f64,
     cross: Vec<f64>,
     gram: Vec<Vec<f64>>,
 }
 
-impl Sums {
+impl ResidualSums {
     fn of(left: &[f64], columns: &[[Vec<f64>; 2]], biased: bool) -> Self {
         let centred = |x: &[f64]| -> Vec<f64> {
             let mean = if biased { x.iter().sum::<f64>() / x.len().max(1) as f64 } else { 0.0 };

@@ -60,7 +60,7 @@ pub(super) struct Instant {
 }
 
 /// The motion in one step.
-pub(super) struct Step {
+pub(super) struct PlantStep {
     pub(super) mean_speed: f64,
     pub(super) speed_change: f64,
     pub(super) at_rest: bool,
@@ -77,7 +77,7 @@ struct Forces {
 }
 
 /// Makes one step.
-pub(super) fn advance(plant: &Plant, s: &mut State, at: &Instant) -> Step {
+pub(super) fn advance(plant: &Plant, s: &mut State, at: &Instant) -> PlantStep {
     let before = s.v;
     s.q += 0.5 * at.h * s.v;
     s.load_q += 0.5 * at.h * s.load_v;
@@ -90,7 +90,7 @@ pub(super) fn advance(plant: &Plant, s: &mut State, at: &Instant) -> Step {
             s.move_coupled(plant, at, &forces, load_share, friction_share)
         }
     };
-    Step { mean_speed: 0.5 * (before + s.v), speed_change: s.v - before, at_rest }
+    PlantStep { mean_speed: 0.5 * (before + s.v), speed_change: s.v - before, at_rest }
 }
 
 impl State {

@@ -105,14 +105,14 @@ pub(crate) fn run(options: &Options, tool: &dyn Tool) -> Result<(), String> {
     let work = |wish: &Wish| run_case(wish, &known, options, tool, &scratch.0);
     // A report that cannot be written now is tried again after the next case; the last failure is
     // reported.
-    let save = |done: &[Option<Outcome>]| drop(report.write(done));
+    let save = |done: &[Option<CaseResult>]| drop(report.write(done));
     let done = pool::map_and_save(options.jobs, options.budget(), "concealed effects", &wishes, work, save);
     print!("{}", report.write(&done)?);
     Ok(())
 }
 
 /// A case, `None` if no carrier holds the effect, or why it could not be run.
-type Outcome = Result<Option<Case>, String>;
+type CaseResult = Result<Option<Case>, String>;
 
 /// The parts of a report that no case changes.
 struct Report<'a> {
@@ -126,7 +126,7 @@ struct Report<'a> {
 
 impl Report<'_> {
     /// Writes `inject.json` and `inject.md` about the cases that are done; returns the latter.
-    fn write(&self, done: &[Option<Outcome>]) -> Result<String, String> {
+    fn write(&self, done: &[Option<CaseResult>]) -> Result<String, String> {
         let done: Vec<Option<&Case>> =
             done.iter().flatten().map(|o| o.as_ref().map(Option::as_ref)).collect::<Result<_, _>>()?;
         let cases: Vec<&Case> = done.iter().flatten().copied().collect();

@@ -18,7 +18,7 @@ pub(super) fn plants(folder: &Path) -> Result<Vec<Plant>, String> {
     let refuse = |why: &str| format!("{}: {why}", key.display());
     let text = std::fs::read_to_string(&key).map_err(|cause| refuse(&format!("cannot be read ({cause})")))?;
     let value: Value =
-        serde_json::from_str(&text).map_err(|cause| refuse(&format!("is no JSON ({cause})")))?;
+        serde_json::from_str(&text).map_err(|cause| refuse(&format!("it is not JSON ({cause})")))?;
     let all = value["plants"].as_array().ok_or_else(|| refuse("has no list `plants`"))?;
     let one = |(index, plant): (usize, &Value)| {
         read(folder, plant).map_err(|why| refuse(&format!("plant {index}: {why}")))
@@ -54,7 +54,7 @@ mod tests {
             (r#"{"plants": [{"file": "b.toml", "kind": "twins", "names": []}]}"#, "plant 0: b.toml"),
             (r#"{"plants": [{"file": "a.toml", "kind": "all", "names": []}]}"#, "plant 0: its `kind`"),
             (r#"{"plants": [{"file": "a.toml", "kind": "nulls"}]}"#, "no list `names`"),
-            ("{", "is no JSON"),
+            ("{", "is not JSON"),
         ] {
             write(KEY, text);
             let error = plants(&folder.0).expect_err("it is refused");

@@ -15,7 +15,7 @@ use control_core::units::{Damping, Millimetres, MillinewtonMetres, Stiffness};
 use device_sim::error::Error;
 use fixed::types::I16F16;
 use lab::commission::bench::{Act, Line};
-use lab::commission::{Outcome, Wish, commission};
+use lab::commission::{CommissioningOutcome, Wish, commission};
 use link::Command;
 use link::frames::CommandRefusal;
 use tests::board::wires::{Wire, Wires};
@@ -185,7 +185,7 @@ impl Bench {
         Self { board, needle, end: None }
     }
 
-    fn commission(&mut self) -> (Result<Outcome, Error>, bool) {
+    fn commission(&mut self) -> (Result<CommissioningOutcome, Error>, bool) {
         let wish = Wish { turns: 1, pull_mm: 40.0, counts_per_turn: None };
         let mut has_moved = false;
         let outcome = commission(self, &wish, |step| {

@@ -22,18 +22,14 @@ pub(super) const TERMS: &[Term] = &[
         &["dead band", "dead bands", "dead-band", "dead zone", "dead zones"],
     ),
     term("holdout", "recordings that no fit and no choice used", &["hold-out", "hold-outs"]),
-    term("held-out", "of the holdout", &["cross-validated", "out-of-sample", "test set", "validation set"]),
+    term("held-out", "of the holdout", &["out-of-sample", "test set", "validation set"]),
     term(
         "sampling rate",
         "rows a second",
         &["sample rate", "sample rates", "sampling frequency", "sample frequency"],
     ),
     term("standard deviation", "the square root of a variance", &["std dev", "stddev", "std deviation"]),
-    term(
-        "log-likelihood",
-        "the logarithm of a likelihood, in nats",
-        &["log likelihood", "loglikelihood", "log-evidence"],
-    ),
+    term("log-likelihood", "the logarithm of a likelihood, in nats", &["log likelihood", "loglikelihood"]),
     term(
         "interval",
         "two bounds that hold a value with a stated probability",
@@ -42,7 +38,7 @@ pub(super) const TERMS: &[Term] = &[
     term(
         "dry friction",
         "a force against the motion that does not grow with speed",
-        &["coulomb friction", "solid friction", "stiction"],
+        &["coulomb friction", "solid friction"],
     ),
     term("backlash", "a gap within which one part moves without the other", &["free play", "back-lash"]),
     term("presliding", "motion before dry friction has its full force", &["pre-sliding"]),
@@ -51,7 +47,7 @@ pub(super) const TERMS: &[Term] = &[
     term("set value", "the force that the amplifier is asked for", &["set point", "set points", "set-point"]),
     term("feedforward", "a force that is added without measuring", &["feed-forward"]),
     term("timeout", "the time after which a message counts as missing", &["time-out", "time-outs"]),
-    term("heartbeat", "the message by which the PC says that it is there", &["heart beat", "keep-alive"]),
+    term("heartbeat", "the message by which the PC says that it is there", &["heart beat"]),
     term("emergency stop", "the button that switches the amplifier off", &["e-stop", "estop", "kill switch"]),
     term("checksum", "a number that reveals a damaged record", &["check sum", "check-sum"]),
     term("bootloader", "the program that writes an image", &["boot loader", "boot-loader"]),

@@ -19,7 +19,9 @@ pub(super) fn read(file: &str, text: &str) -> Result<Log, Error> {
             match serde_json::Deserializer::from_str(text).into_iter().collect::<Result<Vec<Value>, _>>() {
                 Ok(rows) if rows.len() > 1 => Value::Array(rows),
                 _ => {
-                    return Err(Error::input(format_args!("{file}: is no JSON ({cause}); write it again")));
+                    return Err(Error::input(format_args!(
+                        "{file}: this is not JSON ({cause}); write it again"
+                    )));
                 }
             }
         }

@@ -46,7 +46,7 @@ pub struct Wish {
 
 /// The next step, announced before it is done.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Step {
+pub enum CommissioningStep {
     /// The person turns the roller.
     Turn(u32),
     /// The person draws something through.
@@ -59,31 +59,31 @@ pub enum Step {
     Pulses,
 }
 
-impl Step {
+impl CommissioningStep {
     /// True if the motor moves in it.
     pub fn moves(self) -> bool {
-        self == Step::Pulses
+        self == CommissioningStep::Pulses
     }
 }
 
-impl fmt::Display for Step {
+impl fmt::Display for CommissioningStep {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
-            Step::Turn(turns) => write!(
+            CommissioningStep::Turn(turns) => write!(
                 f,
                 "torque stays off: turn the roller by exactly {turns} turns in the direction of insertion, then let go"
             ),
-            Step::Pull(mm) => write!(
+            CommissioningStep::Pull(mm) => write!(
                 f,
                 "torque stays off: draw a strip of paper through under the roller, {mm} mm in the direction of insertion, then let go"
             ),
-            Step::LayFlat => f.write_str(
+            CommissioningStep::LayFlat => f.write_str(
                 "torque stays off: lay the needle as flat as on the skin and hold it still for six seconds",
             ),
-            Step::PointDown => f.write_str(
+            CommissioningStep::PointDown => f.write_str(
                 "torque stays off: point the needle down by some 45° and hold it still for six seconds",
             ),
-            Step::Pulses => write!(
+            CommissioningStep::Pulses => write!(
                 f,
                 "the motor moves now: {PULSES} pulses both ways, of at most 2 mN·m, {} s in all; the needle out and hands off the roller",
                 f64::from(PULSES) * f64::from(PULSE_MS) * 2e-3
@@ -94,7 +94,7 @@ impl fmt::Display for Step {
 
 /// The result.
 #[derive(Clone, Debug)]
-pub struct Outcome {
+pub struct CommissioningOutcome {
     /// The device's part, as the device has it now, under its seal.
     pub record: Record,
     /// The channels were swapped, as the device was configured before.
@@ -109,7 +109,7 @@ pub struct Outcome {
     pub stiffness_lowered: bool,
 }
 
-impl Outcome {
+impl CommissioningOutcome {
     /// Returns the result, one line each.
     pub fn lines(&self) -> Vec<String> {
         let (device, m) = (&self.record.device, &self.mechanism);
@@ -160,8 +160,8 @@ impl From<CommissioningError> for Error {
 pub async fn commission(
     line: &mut dyn Line,
     wish: &Wish,
-    mut ask: impl AsyncFnMut(Step) -> Result<(), Error>,
-) -> Result<Outcome, Error> {
+    mut ask: impl AsyncFnMut(CommissioningStep) -> Result<(), Error>,
+) -> Result<CommissioningOutcome, Error> {
     let mut bench = Bench::open(line).await?;
     let before = bench.device().await?;
     // Whatever it was: until it has passed again it is not commissioned, and the forces that were
@@ -169,19 +169,19 @@ pub async fn commission(
     let mut device = Device { commissioned: false, compensation: Compensation::NONE, ..before };
     let rests = |samples: &[_]| findings::has_moved_and_rests(samples, ticks(REST));
 
-    ask(Step::Turn(wish.turns)).await?;
+    ask(CommissioningStep::Turn(wish.turns)).await?;
     bench.settle().await?;
     let turned = bench.watch(Act::Turn(wish.turns), HAND, rests).await?;
     let (counts_per_turn, channels_swapped) =
         findings::counts_a_turn(turned, wish.turns, wish.counts_per_turn)?;
-    ask(Step::Pull(wish.pull_mm)).await?;
+    ask(CommissioningStep::Pull(wish.pull_mm)).await?;
     bench.settle().await?;
     let pulled = bench.watch(Act::Pull(wish.pull_mm), HAND, rests).await?;
     let radius_mm = findings::roller_radius(pulled, wish.pull_mm, counts_per_turn)?;
-    ask(Step::LayFlat).await?;
+    ask(CommissioningStep::LayFlat).await?;
     bench.settle().await?;
     let flat = findings::mean_tilt(bench.watch(Act::Tilt(0.0), TILTING, |_| false).await?, ticks(LOOK));
-    ask(Step::PointDown).await?;
+    ask(CommissioningStep::PointDown).await?;
     bench.settle().await?;
     let down = findings::mean_tilt(bench.watch(Act::Tilt(DOWN_RAD), TILTING, |_| false).await?, ticks(LOOK));
     findings::check_tilt(flat, down)?;
@@ -194,7 +194,7 @@ pub async fn commission(
     device.limits.stiffness = before.limits.stiffness.min(stiffest(&device));
     bench.configure(&device).await?;
 
-    ask(Step::Pulses).await?;
+    ask(CommissioningStep::Pulses).await?;
     bench.settle().await?;
     let (mechanism, leads_reversed) = find_mechanism(&mut bench, &mut device).await?;
     device.dac_zero = findings::converter_zero(&device, mechanism.offset)?;
@@ -205,7 +205,14 @@ pub async fn commission(
     let stiffness_lowered = device.limits.stiffness < before.limits.stiffness;
     bench.configure(&device).await?;
     let record = bench.commission(&device).await?;
-    Ok(Outcome { record, channels_swapped, leads_reversed, radius_mm, mechanism, stiffness_lowered })
+    Ok(CommissioningOutcome {
+        record,
+        channels_swapped,
+        leads_reversed,
+        radius_mm,
+        mechanism,
+        stiffness_lowered,
+    })
 }
 
 /// Finds the mechanism by pulses, and whether the motor's leads are reversed; then the device

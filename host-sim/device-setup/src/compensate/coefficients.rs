@@ -48,13 +48,13 @@ pub fn found(rig: &Rig, device: &Device, share: f64) -> Result<Found, Error> {
     let full_scale = device.full_scale_torque.0.to_num::<f64>() * 1e-3;
     // A device knows torque by its own full scale; the fit knows it by the inertia.
     let scale = full_scale / f64::from(device.dac.span()) / rig.actuator.gain;
-    let mut sums = Sums::new(rig, scale, full_scale / f64::from(device.dac.span()));
+    let mut sums = NormalEquations::new(rig, scale, full_scale / f64::from(device.dac.span()));
     rig.effects.iter().for_each(|effect| sums.add(effect));
     sums.finish(device, share, rig.model.inertia * scale)
 }
 
 /// The parts while effects are gone through, on the device's scale.
-struct Sums {
+struct NormalEquations {
     scale: f64,
     per_code: f64,
     dry: [f64; 2],
@@ -68,7 +68,7 @@ struct Sums {
     left_out: Vec<String>,
 }
 
-impl Sums {
+impl NormalEquations {
     fn new(rig: &Rig, scale: f64, per_code: f64) -> Self {
         let model = &rig.model;
         let value = |x: Option<f64>| x.unwrap_or(0.0) * scale;

@@ -23,7 +23,7 @@ use link::commissioning::Record;
 use residual_force::ResidualForce;
 use std::f64::consts::TAU;
 use std::time::Duration;
-pub use step::{Part, Step};
+pub use step::{CompensationStep, Part};
 
 /// Speed of the slow turns, mm/s: a slow insertion.
 const SPEED_MM_S: f64 = 10.0;
@@ -44,7 +44,7 @@ const REPEATS_SHARE: f64 = 0.05;
 
 /// The result.
 #[derive(Clone, Debug)]
-pub struct Outcome {
+pub struct CompensationOutcome {
     /// The device's part, as the device has it now, under its seal.
     pub record: Record,
     /// The rotor's angle, if any part depends on it.
@@ -69,7 +69,7 @@ pub struct Outcome {
     pub motion_s: f64,
 }
 
-impl Outcome {
+impl CompensationOutcome {
     /// Returns the result, one line each.
     pub fn lines(&self) -> Vec<String> {
         let mut lines: Vec<String> =
@@ -122,8 +122,8 @@ pub async fn compensate(
     line: &mut dyn Line,
     rig: &Rig,
     wish: Wish,
-    mut ask: impl AsyncFnMut(Step) -> Result<(), Error>,
-) -> Result<Outcome, Error> {
+    mut ask: impl AsyncFnMut(CompensationStep) -> Result<(), Error>,
+) -> Result<CompensationOutcome, Error> {
     let mut bench = Bench::open(line).await?;
     let device = bench.device().await?;
     if !device.commissioned {
@@ -168,17 +168,17 @@ struct Trial {
     residual: ResidualForce,
 }
 
-impl<A: AsyncFnMut(Step) -> Result<(), Error>> Work<'_, '_, A> {
-    async fn run(&mut self) -> Result<Outcome, Error> {
+impl<A: AsyncFnMut(CompensationStep) -> Result<(), Error>> Work<'_, '_, A> {
+    async fn run(&mut self) -> Result<CompensationOutcome, Error> {
         let radius = self.before.roller_radius.0.to_num::<f64>();
         let (turns, hold) = excitations(self.found.inertia, radius, false);
         let was_fed = Part::ALL.into_iter().any(|part| part.is_fed(&self.before.compensation));
         self.may_move(&turns, &hold, if was_fed { 3.0 } else { 2.0 })?;
         let level = if self.found.has_weight { None } else { Some(self.turn_level(&turns).await?) };
-        (self.ask)(Step::Tilt).await?;
+        (self.ask)(CompensationStep::Tilt).await?;
         self.bench.settle().await?;
         self.bench.watch(Act::Tilt(DOWN_RAD), TILTING, |_| false).await?;
-        (self.ask)(Step::Before).await?;
+        (self.ask)(CompensationStep::Before).await?;
         let bare = play(self.bench, &turns, &hold).await?;
         let weight_mnm = level.and_then(|level| self.take_weight(&level, &bare.0));
         let full = Device { compensation: self.found.compensation, ..self.before };
@@ -203,7 +203,7 @@ impl<A: AsyncFnMut(Step) -> Result<(), Error>> Work<'_, '_, A> {
                 );
             }
         }
-        Ok(Outcome {
+        Ok(CompensationOutcome {
             record: self.bench.record().await?,
             angle,
             before,
@@ -233,10 +233,10 @@ impl<A: AsyncFnMut(Step) -> Result<(), Error>> Work<'_, '_, A> {
 
     /// The slow turns with the device level.
     async fn turn_level(&mut self, turns: &Excitation) -> Result<Vec<Sample>, Error> {
-        (self.ask)(Step::Level).await?;
+        (self.ask)(CompensationStep::Level).await?;
         self.bench.settle().await?;
         self.bench.watch(Act::Tilt(0.0), TILTING, |_| false).await?;
-        (self.ask)(Step::Weight).await?;
+        (self.ask)(CompensationStep::Weight).await?;
         played(self.bench, turns).await
     }
 
@@ -266,7 +266,7 @@ impl<A: AsyncFnMut(Step) -> Result<(), Error>> Work<'_, '_, A> {
         let (turns, hold) = excitations(self.found.inertia, full.roller_radius.0.to_num(), true);
         let trial_s = seconds(&turns) + seconds(&hold);
         let mut taken_back = Vec::new();
-        let mut kept = self.try_it(full, angle, Step::After).await?;
+        let mut kept = self.try_it(full, angle, CompensationStep::After).await?;
         while excess(before, &kept.residual) > 0.0 {
             let mut best: Option<(Part, Trial)> = None;
             let fed = |device: &Device| Part::ALL.map(|part| (part, part.is_fed(&device.compensation)));
@@ -280,7 +280,7 @@ impl<A: AsyncFnMut(Step) -> Result<(), Error>> Work<'_, '_, A> {
                 }
                 let mut device = kept.device;
                 *part.gain(&mut device.compensation.gains) = Gain(0);
-                let trial = self.try_it(&device, angle, Step::Without(part)).await?;
+                let trial = self.try_it(&device, angle, CompensationStep::Without(part)).await?;
                 let order = |residual: &ResidualForce| (excess(before, residual), residual.all());
                 if best.as_ref().is_none_or(|(_, other)| order(&trial.residual) < order(&other.residual)) {
                     best = Some((part, trial));
@@ -310,7 +310,7 @@ impl<A: AsyncFnMut(Step) -> Result<(), Error>> Work<'_, '_, A> {
         &mut self,
         device: &Device,
         angle: Option<angle::Angle>,
-        step: Step,
+        step: CompensationStep,
     ) -> Result<Trial, Error> {
         (self.ask)(step).await?;
         self.bench.settle().await?;

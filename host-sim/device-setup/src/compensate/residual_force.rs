@@ -82,7 +82,7 @@ pub fn measure(
     Ok(ResidualForce { insertion: inwards.root(), hold: held.root(), withdrawal: outwards.root(), by_tenth })
 }
 
-struct Step {
+struct StaircaseStep {
     place_mm: f64,
     speed: f64,
     /// N, the servo's.
@@ -90,7 +90,7 @@ struct Step {
 }
 
 /// The servo's force in each tick.
-fn forces(plan: &Plan, excitation: &Excitation, samples: &[Sample]) -> Result<Vec<Step>, Error> {
+fn forces(plan: &Plan, excitation: &Excitation, samples: &[Sample]) -> Result<Vec<StaircaseStep>, Error> {
     let refuse = |why: control_core::Refusal| Error::input(format_args!("this excitation is refused: {why}"));
     let device = *plan.device();
     // Counts are in the direction of insertion already.
@@ -121,7 +121,7 @@ fn forces(plan: &Plan, excitation: &Excitation, samples: &[Sample]) -> Result<Ve
         let output = controller.tick(input);
         let speed = reference.tick().speed.0.to_num();
         if at >= FADED {
-            steps.push(Step {
+            steps.push(StaircaseStep {
                 place_mm: f64::from(sample.count - begin) * mm_per_count,
                 speed,
                 force: (f64::from(output.sample.dac) - middle) * mnm_per_code / radius,

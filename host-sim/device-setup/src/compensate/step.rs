@@ -5,7 +5,7 @@ use std::fmt;
 
 /// The next step, announced before it is done.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Step {
+pub enum CompensationStep {
     /// The person lays the device level: the report knows no weight, so that it is measured.
     Level,
     /// The roller turns slowly while the device is level.
@@ -21,28 +21,28 @@ pub enum Step {
     Without(Part),
 }
 
-impl Step {
+impl CompensationStep {
     /// Returns true if the motor moves in it.
     pub fn moves(self) -> bool {
-        !matches!(self, Step::Level | Step::Tilt)
+        !matches!(self, CompensationStep::Level | CompensationStep::Tilt)
     }
 }
 
-impl fmt::Display for Step {
+impl fmt::Display for CompensationStep {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Step::Level => f.write_str("torque stays off: lay the device level and leave it so"),
-            Step::Weight => f.write_str(
+            CompensationStep::Level => f.write_str("torque stays off: lay the device level and leave it so"),
+            CompensationStep::Weight => f.write_str(
                 "the roller turns slowly to and fro by one turn, to find the weight that the report does not have: hands off",
             ),
-            Step::Tilt => {
+            CompensationStep::Tilt => {
                 f.write_str("torque stays off: point the device down by some 30° and leave it so until the end")
             }
-            Step::Before => {
+            CompensationStep::Before => {
                 f.write_str("the roller turns slowly to and fro by one turn, then it is held: hands off")
             }
-            Step::After => f.write_str("the same again, with what is fed forward: hands off"),
-            Step::Without(part) => {
+            CompensationStep::After => f.write_str("the same again, with what is fed forward: hands off"),
+            CompensationStep::Without(part) => {
                 write!(f, "with all of it the hand feels more than before; the same without {part}: hands off")
             }
         }

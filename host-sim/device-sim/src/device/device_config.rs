@@ -150,7 +150,7 @@ fn damping(key: &str, value: f64) -> Result<Damping, String> {
 
 fn tilt(key: &str, degrees: f64) -> Result<Milliradians, String> {
     if !(-90.0..=90.0).contains(&degrees) {
-        return Err(format!("{key} is {degrees}; it must be from -90 to 90"));
+        return Err(format!("{key} is {degrees} degrees; it must be from -90 to 90 degrees"));
     }
     Ok(Milliradians((degrees.to_radians() * 1e3).round() as i16))
 }

@@ -10,7 +10,7 @@ pub struct GuideState {
     kind: &'static str,
     title: String,
     device: String,
-    steps: Vec<Step>,
+    steps: Vec<GuideStep>,
     reading: Option<Reading>,
     end: Option<End>,
     /// The number of steps that the page has agreed to.
@@ -22,7 +22,7 @@ pub struct GuideState {
 
 /// One step, from the moment in which it is asked for.
 #[derive(Clone, Debug, Serialize)]
-struct Step {
+struct GuideStep {
     text: String,
     /// True if the motor moves in it.
     moves: bool,
@@ -86,7 +86,7 @@ impl GuideState {
     /// Shows the next step. Returns its number, counted from 1.
     pub fn ask(&mut self, text: String, moves: bool) -> usize {
         self.finish_last();
-        self.steps.push(Step { text, moves, stage: Stage::Asked, news: String::new() });
+        self.steps.push(GuideStep { text, moves, stage: Stage::Asked, news: String::new() });
         self.steps.len()
     }
 

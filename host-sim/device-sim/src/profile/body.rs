@@ -2,9 +2,7 @@
 //! turn of the limb. The layers of the file then say what each tissue feels like, and the line
 //! through the body says which are met and where.
 
-use super::{File, Layer, Profile, TissueName, check_angle};
-use crate::error::Error;
-use crate::named_files::{self, Text};
+use super::{File, Layer, TissueName};
 use crate::session::{SceneBody, SceneOutline};
 use anatomy::{Body, Line, Piece, Place, Site, Tissue};
 use control_core::config::MAX_LAYERS;
@@ -41,35 +39,6 @@ pub(super) struct Written {
     turn_deg: f64,
     /// Thickness of the fat; without it, that of the site.
     fat_mm: Option<f64>,
-}
-
-/// The options of a command that change where and how a needle enters a body; without one, the
-/// patient's file says it.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Entry {
-    /// `--along`: the point of entry along the limb, mm.
-    pub along_mm: Option<f64>,
-    /// `--around`: the point of entry around the limb from its top, degrees.
-    pub around_deg: Option<f64>,
-    /// `--azimuth`: the needle's direction seen from above, degrees.
-    pub azimuth_deg: Option<f64>,
-    /// `--turn`: the turn of the limb about its axis, degrees.
-    pub turn_deg: Option<f64>,
-    /// `--angle`: the needle's inclination below the horizontal, 5 to 90 degrees.
-    pub angle_deg: Option<f64>,
-}
-
-impl Entry {
-    /// Refuses values out of range at a site, by the names of the options.
-    fn check(&self, site: Site) -> Result<(), String> {
-        self.along_mm.map_or(Ok(()), |mm| check_along("--along", mm, site))?;
-        for (option, degrees) in
-            [("--around", self.around_deg), ("--azimuth", self.azimuth_deg), ("--turn", self.turn_deg)]
-        {
-            degrees.map_or(Ok(()), |degrees| check_direction(option, degrees))?;
-        }
-        self.angle_deg.map_or(Ok(()), |degrees| check_angle("--angle", degrees))
-    }
 }
 
 /// The body that a needle enters, its way and what it meets.
@@ -127,7 +96,7 @@ impl Written {
 }
 
 /// Refuses a distance along the limb that the body does not have; `key` as the user wrote it.
-fn check_along(key: &str, mm: f64, site: Site) -> Result<(), String> {
+pub(super) fn check_along(key: &str, mm: f64, site: Site) -> Result<(), String> {
     let [low, high] = site.along_mm();
     if (low..=high).contains(&mm) {
         return Ok(());
@@ -136,7 +105,7 @@ fn check_along(key: &str, mm: f64, site: Site) -> Result<(), String> {
 }
 
 /// Refuses a direction that is not from -180 to 180 degrees; `key` as the user wrote it.
-fn check_direction(key: &str, degrees: f64) -> Result<(), String> {
+pub(super) fn check_direction(key: &str, degrees: f64) -> Result<(), String> {
     if (-180.0..=180.0).contains(&degrees) {
         return Ok(());
     }
@@ -236,37 +205,6 @@ impl InBody {
     }
 }
 
-impl Profile {
-    /// The same patient entered as `entry` says: what the line through its body meets follows from
-    /// it.
-    ///
-    /// # Errors
-    ///
-    /// If the patient has no body, a value is out of range, or the needle would not enter.
-    pub fn entered(&self, entry: &Entry) -> Result<Self, Error> {
-        let refuse = |what: &str| Error::input(format_args!("{}: {what}", self.source.origin));
-        let body = self.body.as_ref().ok_or_else(|| {
-            refuse("this patient is layers without a body; choose one with [body], such as forearm")
-        })?;
-        entry.check(body.site).map_err(Error::input)?;
-        let mut table: toml::Table = named_files::parse(&self.source)?;
-        let set = |table: &mut toml::Table, key: &str, value: Option<f64>| {
-            if let Some(value) = value {
-                table.insert(key.to_owned(), toml::Value::Float(value));
-            }
-        };
-        set(&mut table, "entry_deg", entry.angle_deg);
-        if let Some(body) = table.get_mut("body").and_then(toml::Value::as_table_mut) {
-            set(body, "along_mm", entry.along_mm);
-            set(body, "around_deg", entry.around_deg);
-            set(body, "azimuth_deg", entry.azimuth_deg);
-            set(body, "turn_deg", entry.turn_deg);
-        }
-        let text = toml::to_string(&table).map_err(|cause| refuse(&cause.to_string()))?;
-        Self::parse_for(Text { origin: self.source.origin.clone(), text }, &self.config.device)
-    }
-}
-
 impl File {
     /// Replaces the layers, which say what each tissue feels like, by those that the needle's line
     /// meets in the body, if there is one.
@@ -293,9 +231,9 @@ impl File {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use crate::named_files::Text;
     use crate::procedure::Procedure;
-    use crate::profile::BUILT_IN;
+    use crate::profile::{BUILT_IN, Entry, Profile};
 
     fn find(name: &str) -> Profile {
         Profile::find(name).expect("it is built in")
@@ -356,37 +294,6 @@ mod tests {
         assert_eq!(names, ["skin", "fat", "muscle"]);
         let over: Vec<_> = layers(&find("forearm")).into_iter().map(|(name, _)| name).collect();
         assert_eq!(over, ["skin", "fat", "vein", "far wall", "muscle"]);
-    }
-
-    #[test]
-    fn a_refused_entry_names_the_option_and_its_unit() {
-        let none = Entry::default();
-        for (entry, wanted) in [
-            (
-                Entry { along_mm: Some(300.0), ..none },
-                "--along is 300 mm; it must be from -60 to 80 mm at the forearm",
-            ),
-            (
-                Entry { around_deg: Some(-181.0), ..none },
-                "--around is -181 degrees; it must be from -180 to 180 degrees",
-            ),
-            (
-                Entry { azimuth_deg: Some(f64::NAN), ..none },
-                "--azimuth is NaN degrees; it must be from -180 to 180 degrees",
-            ),
-            (
-                Entry { turn_deg: Some(300.0), ..none },
-                "--turn is 300 degrees; it must be from -180 to 180 degrees",
-            ),
-            (
-                Entry { angle_deg: Some(3.0), ..none },
-                "--angle is 3 degrees; it must be from 5 to 90 degrees, the angle to the skin",
-            ),
-        ] {
-            assert_eq!(find("forearm").entered(&entry).expect_err(wanted).to_string(), wanted);
-        }
-        let no_body = find("adult").entered(&none).expect_err("it has no body").to_string();
-        assert!(no_body.contains("adult") && no_body.contains("choose one with [body]"), "{no_body}");
     }
 
     #[test]

@@ -260,7 +260,7 @@ fn mrad(key: &str, degrees: f64) -> Result<Milliradians, String> {
     if (0.0..=180.0).contains(&degrees) {
         Ok(Milliradians((degrees.to_radians() * 1e3).round() as i16))
     } else {
-        Err(format!("{key} is {degrees}; it must be from 0 to 180"))
+        Err(format!("{key} is {degrees} degrees; it must be from 0 to 180 degrees"))
     }
 }
 
@@ -297,7 +297,10 @@ impl Forces {
             for row in &self.force_n {
                 let millinewtons = (row[depth] * 1e3).round();
                 if !(0.0..=MOST_MILLINEWTONS).contains(&millinewtons) {
-                    return Err(format!("force_n holds {}; a force must be from 0 to 16.383", row[depth]));
+                    return Err(format!(
+                        "force_n holds {} N; a force must be from 0 to 16.383 N",
+                        row[depth]
+                    ));
                 }
                 forces.push(millinewtons as u16);
             }

@@ -5,6 +5,7 @@
 mod beside;
 mod body;
 mod condition;
+mod entry;
 mod goal;
 mod law;
 mod person;
@@ -22,7 +23,9 @@ use fixed::types::I16F16;
 use serde::Deserialize;
 
 pub use beside::Beside;
-pub use body::{Entry, InBody};
+pub use body::InBody;
+pub use entry::Entry;
+use entry::check_angle;
 pub use goal::Goal;
 pub use law::Model;
 use person::Thickness;
@@ -217,14 +220,6 @@ impl Profile {
             width_mm: shape.map_or(far - near, |shape| shape.width.0.to_num()),
             offset_mm: shape.map_or(0.0, |shape| shape.offset.0.to_num()),
         })
-    }
-}
-
-fn check_angle(key: &str, degrees: f64) -> Result<(), String> {
-    if (5.0..=90.0).contains(&degrees) {
-        Ok(())
-    } else {
-        Err(format!("{key} is {degrees} degrees; it must be from 5 to 90 degrees, the angle to the skin"))
     }
 }
 

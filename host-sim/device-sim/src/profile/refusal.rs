@@ -18,7 +18,10 @@ pub(super) fn say(refusal: &plan::Refusal, file: &File) -> String {
         WrongWay { layer } | ReliefAboveElastic { layer } | BeyondTravel { layer } | NoVessel { layer } => {
             layer
         }
-        OutOfRange { field, value, .. } => {
+        OutOfRange { field, value, low, high } => {
+            if let Some(sentence) = in_degrees(field, [value, low, high]) {
+                return sentence;
+            }
             return match file.layer.iter().position(|layer| has(layer, field, value)) {
                 Some(at) => {
                     format!("{refusal} (in layer {at}, {})", tissue_name(file.layer[at].tissue.into()))
@@ -32,6 +35,18 @@ pub(super) fn say(refusal: &plan::Refusal, file: &File) -> String {
         Some(named) => format!("{refusal} (layer {layer} is {})", tissue_name(named.tissue.into())),
         None => refusal.to_string(),
     }
+}
+
+/// A value out of its range, for a field that the file has per degree or in degrees.
+fn in_degrees(field: Field, numbers: [I16F16; 3]) -> Option<String> {
+    let degree_mrad = 1f64.to_radians() * 1e3;
+    let (key, factor, unit) = match field {
+        Field::LargestAngle => ("largest_deg", 1.0 / degree_mrad, "degrees"),
+        Field::LateralForce => ("lateral_n_per_deg", degree_mrad, "N per degree"),
+        _ => return None,
+    };
+    let [value, low, high] = numbers.map(|number| (number.to_num::<f64>() * factor * 100.0).round() / 100.0);
+    Some(format!("{key} is {value} {unit}; it must be from {low} to {high} {unit}"))
 }
 
 /// True if a layer has this value under the key of `field`.

@@ -110,7 +110,11 @@ fn each_law_has_a_patient_whose_file_says_what_is_its_own() {
         (shoulder.replace("depth_mm = 29.0", "depth_mm = -29.0"), "depth_mm of layer 5 is -29"),
         (shoulder.replace("depth_mm = 29.0", "depth_mm = 23.0"), "does not begin below"),
         (shoulder.replace("sliding_n = 0.3", "sliding_n = nan"), "sliding_n is NaN"),
-        (shoulder.replace("largest_deg = 10.0", "largest_deg = 190.0"), "largest_deg is 190"),
+        (shoulder.replace("largest_deg = 10.0", "largest_deg = 190.0"), "largest_deg is 190 degrees"),
+        (
+            shoulder.replace("largest_deg = 10.0", "largest_deg = 60.0"),
+            "largest_deg is 60 degrees; it must be from 0.06 to 44.98 degrees",
+        ),
         (shoulder.replace("site = \"shoulder\"", "site = \"elbow\""), "elbow"),
         (shoulder.replace("age_years = 50", "age_years = 130"), "patient.age_years is 130"),
         (shoulder.replace("height_cm = 176.0", "height_cm = nan"), "patient.height_cm is NaN"),

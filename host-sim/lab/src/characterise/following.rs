@@ -1,12 +1,12 @@
 //! The reference that the device follows, played along on the PC so that it can be written down.
 
-use super::programme::Step;
+use super::programme::ProgrammeStep;
 use control_core::TICK_HZ;
 use control_core::excitation::Reference;
 
 /// The reference of steps that play without a rest between them.
 pub(super) struct Following<'a> {
-    steps: &'a [Step],
+    steps: &'a [ProgrammeStep],
     reference: Reference,
     /// The place at which the reference of this step began, in counts.
     begin: f64,
@@ -16,7 +16,7 @@ pub(super) struct Following<'a> {
 
 impl<'a> Following<'a> {
     /// From the place in counts at which the motor was one tick before; none if there is no step.
-    pub(super) fn new(steps: &'a [Step], begin: f64, mm_per_count: f64) -> Option<Self> {
+    pub(super) fn new(steps: &'a [ProgrammeStep], begin: f64, mm_per_count: f64) -> Option<Self> {
         let first = steps.first()?;
         let (reference, remaining_ticks) = begun(first);
         Some(Self { steps, reference, begin, remaining_ticks, mm_per_count })
@@ -45,7 +45,7 @@ impl<'a> Following<'a> {
     }
 }
 
-fn begun(step: &Step) -> (Reference, u32) {
+fn begun(step: &ProgrammeStep) -> (Reference, u32) {
     let ticks = step.excitation.duration_ms.saturating_mul(TICK_HZ / 1000);
     (Reference::new(&step.excitation.signal), ticks)
 }

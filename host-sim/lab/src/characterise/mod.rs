@@ -14,7 +14,7 @@ use device_sim::error::Error;
 use device_sim::lockstep;
 use link::device::{Endpoint, Identity};
 use mechanism::BareDevice;
-use programme::{Programme, Step};
+use programme::{Programme, ProgrammeStep};
 use recording::messages::Hello;
 use sequencer::Sequencer;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -62,7 +62,7 @@ pub fn on_virtual(
         sequencer.connected(lockstep::time(device.ticks()));
         while !sequencer.is_over() {
             let now = lockstep::time(device.ticks());
-            device.receive(sequencer.transmit(now, |step: &Step| {
+            device.receive(sequencer.transmit(now, |step: &ProgrammeStep| {
                 device_tilt(step, &mut news);
             }));
             for _ in 0..lockstep::TICKS {
@@ -77,7 +77,7 @@ pub fn on_virtual(
     Ok(tracks)
 }
 
-fn device_tilt(step: &Step, news: &mut impl FnMut(News)) {
+fn device_tilt(step: &ProgrammeStep, news: &mut impl FnMut(News)) {
     if let Some(prompt) = step.prompt {
         news(News::Prompt(prompt));
     }

@@ -21,19 +21,19 @@ pub struct Programme {
     /// Name of the file.
     pub file: &'static str,
     /// The steps, in order.
-    pub steps: Vec<Step>,
+    pub steps: Vec<ProgrammeStep>,
 }
 
 /// One excitation of a recording.
 #[derive(Clone, Debug)]
-pub struct Step {
+pub struct ProgrammeStep {
     /// The excitation that the device plays.
     pub excitation: Excitation,
     /// The instruction to a person meanwhile.
     pub prompt: Option<&'static str>,
 }
 
-impl Step {
+impl ProgrammeStep {
     /// Returns the tilt by a person who follows the prompt, `into` the step, in rad; the virtual
     /// device tilts this way.
     pub fn tilt_at(&self, into: Duration) -> f64 {
@@ -132,13 +132,13 @@ impl Kit {
         }
     }
 
-    fn step(&self, signal: Signal, duration_ms: u32) -> Step {
+    fn step(&self, signal: Signal, duration_ms: u32) -> ProgrammeStep {
         let travel = Millimetres(I16F16::from_num(TRAVEL_MM));
         let excitation = Excitation { signal, duration_ms, servo: self.servo, travel, compensated: false };
-        Step { excitation, prompt: None }
+        ProgrammeStep { excitation, prompt: None }
     }
 
-    fn staircase(&self, slowest: f64, ratio: f64, steps: u8, dwell_ms: u16, rounds: u32) -> Step {
+    fn staircase(&self, slowest: f64, ratio: f64, steps: u8, dwell_ms: u16, rounds: u32) -> ProgrammeStep {
         let signal = Signal::SpeedStaircase {
             slowest: MillimetresPerSecond(I16F16::from_num(slowest)),
             ratio: I16F16::from_num(ratio),
@@ -148,7 +148,7 @@ impl Kit {
         self.step(signal, 2 * rounds * u32::from(steps) * u32::from(dwell_ms))
     }
 
-    fn triangle(&self, stroke: f64, speed: f64, duration_ms: u32) -> Step {
+    fn triangle(&self, stroke: f64, speed: f64, duration_ms: u32) -> ProgrammeStep {
         let signal = Signal::Triangle {
             stroke: Millimetres(I16F16::from_num(stroke)),
             speed: MillimetresPerSecond(I16F16::from_num(speed)),
@@ -156,7 +156,7 @@ impl Kit {
         self.step(signal, duration_ms)
     }
 
-    fn ladder(&self, smallest: f64, ratio: f64, steps: u8, speed: f64, duration_ms: u32) -> Step {
+    fn ladder(&self, smallest: f64, ratio: f64, steps: u8, speed: f64, duration_ms: u32) -> ProgrammeStep {
         let signal = Signal::ReversalLadder {
             smallest: Millimetres(I16F16::from_num(smallest)),
             ratio: I16F16::from_num(ratio),
@@ -168,21 +168,21 @@ impl Kit {
 
     /// Twelve sines, each of `share` of the dry friction, from below the servo to where a delay and
     /// a lag part.
-    fn multisine(&self, share: f64, duration_ms: u32) -> Step {
+    fn multisine(&self, share: f64, duration_ms: u32) -> ProgrammeStep {
         let frequencies = [5, 9, 14, 21, 32, 47, 68, 97, 139, 197, 281, 397].into_iter().collect();
         let torque = MillinewtonMetres(I16F16::from_num(share * self.dry_mnm));
         self.step(Signal::Multisine { torque, frequencies }, duration_ms)
     }
 
     /// Ramps to `times` the dry friction.
-    fn ramps(&self, times: f64, ramp_ms: u16, duration_ms: u32) -> Step {
+    fn ramps(&self, times: f64, ramp_ms: u16, duration_ms: u32) -> ProgrammeStep {
         let torque = MillinewtonMetres(I16F16::from_num(times * self.dry_mnm));
         self.step(Signal::BreakawayRamps { torque, ramp_ms }, duration_ms)
     }
 
     /// A slow triangle while a person tilts the device: a motor that moves shows the weight, one
     /// that sticks hides it.
-    fn tilt(&self, duration_ms: u32) -> Step {
-        Step { prompt: Some(TILT_PROMPT), ..self.triangle(30.0, 30.0, duration_ms) }
+    fn tilt(&self, duration_ms: u32) -> ProgrammeStep {
+        ProgrammeStep { prompt: Some(TILT_PROMPT), ..self.triangle(30.0, 30.0, duration_ms) }
     }
 }

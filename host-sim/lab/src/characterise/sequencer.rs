@@ -4,7 +4,7 @@
 //! ends it: a recording with a hole is no recording.
 
 use super::following::Following;
-use super::programme::{Programme, Step};
+use super::programme::{Programme, ProgrammeStep};
 use super::writer::Track;
 use control_core::controller::Sample;
 use control_core::event::{Fault, State};
@@ -38,7 +38,7 @@ pub struct Sequencer<'a> {
     driver: Driver,
     file: &'static str,
     /// Steps that play without a rest, in order.
-    parts: Vec<&'a [Step]>,
+    parts: Vec<&'a [ProgrammeStep]>,
     phase: Phase,
     now: Duration,
     hello: Option<Hello>,
@@ -87,7 +87,7 @@ impl<'a> Sequencer<'a> {
     }
 
     /// Returns the bytes to send now; calls `begins` for every step that is requested.
-    pub fn transmit(&mut self, now: Duration, mut begins: impl FnMut(&Step)) -> &[u8] {
+    pub fn transmit(&mut self, now: Duration, mut begins: impl FnMut(&ProgrammeStep)) -> &[u8] {
         self.now = now;
         match self.phase {
             Phase::Greeting { .. } if self.driver.is_ready(now) && self.hello.is_some() => {
@@ -133,7 +133,7 @@ impl<'a> Sequencer<'a> {
     }
 
     /// The first step of the part that is played, and since when.
-    pub fn playing(&self) -> Option<(&Step, Duration)> {
+    pub fn playing(&self) -> Option<(&ProgrammeStep, Duration)> {
         match self.phase {
             Phase::Playing { index, since } => Some((self.parts[index].first()?, since)),
             _ => None,
@@ -161,7 +161,7 @@ impl<'a> Sequencer<'a> {
         Ok(Track { file: self.file, hello, samples: self.samples, reference: self.reference })
     }
 
-    fn ask(&mut self, index: usize, begins: &mut impl FnMut(&Step)) {
+    fn ask(&mut self, index: usize, begins: &mut impl FnMut(&ProgrammeStep)) {
         let part = self.parts[index];
         part.iter().for_each(begins);
         match part {

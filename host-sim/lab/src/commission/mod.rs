@@ -4,7 +4,7 @@
 pub mod bench;
 pub mod mechanism;
 
-pub use device_setup::commission::{Outcome, Step, Wish, findings};
+pub use device_setup::commission::{CommissioningOutcome, CommissioningStep, Wish, findings};
 
 use bench::Line;
 use device_setup::pause::block_on;
@@ -15,7 +15,7 @@ use device_sim::error::Error;
 pub fn commission(
     line: &mut dyn Line,
     wish: &Wish,
-    mut ask: impl FnMut(Step) -> Result<(), Error>,
-) -> Result<Outcome, Error> {
+    mut ask: impl FnMut(CommissioningStep) -> Result<(), Error>,
+) -> Result<CommissioningOutcome, Error> {
     block_on(device_setup::commission::commission(line, wish, async |step| ask(step)))
 }

@@ -1,6 +1,6 @@
 //! The files that a compensation leaves: a page, and the device's part of the configuration.
 
-use super::{Outcome, page};
+use super::{CompensationOutcome, page};
 use device_sim::device::device_config;
 use device_sim::error::Error;
 use std::path::{Path, PathBuf};
@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 ///
 /// # Errors
 /// A sentence if they cannot be written.
-pub fn write(folder: &Path, device: &str, outcome: &Outcome) -> Result<Vec<PathBuf>, Error> {
+pub fn write(folder: &Path, device: &str, outcome: &CompensationOutcome) -> Result<Vec<PathBuf>, Error> {
     let refuse = |cause: std::io::Error| {
         Error::input(format_args!(
             "{}: cannot be written ({cause}); the device keeps its compensation; choose another --out",

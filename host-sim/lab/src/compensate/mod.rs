@@ -4,7 +4,9 @@
 pub mod files;
 pub mod page;
 
-pub use device_setup::compensate::{Outcome, Part, Step, Wish, angle, coefficients, residual_force, weight};
+pub use device_setup::compensate::{
+    CompensationOutcome, CompensationStep, Part, Wish, angle, coefficients, residual_force, weight,
+};
 
 use crate::commission::bench::Line;
 use device_setup::pause::block_on;
@@ -30,8 +32,8 @@ pub fn compensate(
     line: &mut dyn Line,
     rig: &Rig,
     wish: Wish,
-    mut ask: impl FnMut(Step) -> Result<(), Error>,
-) -> Result<Outcome, Error> {
+    mut ask: impl FnMut(CompensationStep) -> Result<(), Error>,
+) -> Result<CompensationOutcome, Error> {
     block_on(device_setup::compensate::compensate(line, rig, wish, async |step| ask(step)))
 }
 

@@ -1,13 +1,13 @@
 //! Before and after, as a page that needs no other file.
 
-use super::Outcome;
+use super::CompensationOutcome;
 use super::residual_force::{PARTS, ResidualForce};
 use control_core::compensation::Gain;
 use html_report::chart::{Chart, Curve};
 use html_report::{Cell, Sheet, decimal};
 
 /// The page.
-pub fn html(outcome: &Outcome) -> String {
+pub fn html(outcome: &CompensationOutcome) -> String {
     let (before, after) = (&outcome.before, &outcome.after);
     let not_kept =
         if outcome.is_compensated { "" } else { " No part of it helped: the device is as it was before." };
@@ -90,7 +90,7 @@ fn by_tenth(before: &ResidualForce, after: &ResidualForce) -> Chart {
     }
 }
 
-fn parts(outcome: &Outcome) -> Vec<Vec<Cell>> {
+fn parts(outcome: &CompensationOutcome) -> Vec<Vec<Cell>> {
     let found = &outcome.record.device.compensation;
     let mut rows = Vec::new();
     let mut put = |part: &str, value: String, gain: Gain| {

@@ -4,7 +4,7 @@
 use super::subject::Subject;
 use super::{Progress, Settings};
 use crate::compensate::residual_force::ResidualForce;
-use crate::compensate::{self, Outcome, Wish, files};
+use crate::compensate::{self, CompensationOutcome, Wish, files};
 use device_sim::error::Error;
 use diagnosis::rig::Rig;
 
@@ -60,6 +60,6 @@ pub(super) fn feel(
     if !outcome.is_compensated {
         return Ok(Err(format!("nothing is fed forward: {}", notes.join("; "))));
     }
-    let Outcome { before, after, motion_s, .. } = outcome;
+    let CompensationOutcome { before, after, motion_s, .. } = outcome;
     Ok(Ok(Feel { before, after, motion_s, notes }))
 }

@@ -114,7 +114,7 @@ pub enum Progress<'a> {
     /// The diagnosis says this.
     Said(&'a str),
     /// A step of the compensation begins.
-    Feeds(compensate::Step),
+    Feeds(compensate::CompensationStep),
 }
 
 /// A round that is to be played.

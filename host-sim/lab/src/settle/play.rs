@@ -2,7 +2,7 @@
 
 use super::{Asked, in_words};
 use crate::characterise;
-use crate::characterise::programme::{Programme, Step, TRAVEL_MM};
+use crate::characterise::programme::{Programme, ProgrammeStep, TRAVEL_MM};
 use control_core::excitation::{self, Excitation, Servo};
 use control_core::units::{Millimetres, MillimetresPerSecond, MillinewtonMetres};
 use control_core::{Config, Device, TICK_HZ};
@@ -172,7 +172,7 @@ impl Limited {
         Ok(asked)
     }
 
-    fn step(&self, segment: &Segment, servo: Servo) -> Step {
+    fn step(&self, segment: &Segment, servo: Servo) -> ProgrammeStep {
         let mm = |rad: f64| I16F16::saturating_from_num(rad * self.radius_mm);
         let torque = |newton_metres: f64| MillinewtonMetres(I16F16::saturating_from_num(newton_metres * 1e3));
         let ms = |seconds: f64| (seconds * 1e3).round().clamp(0.0, 65_535.0) as u16;
@@ -212,7 +212,7 @@ impl Limited {
             travel: Millimetres(I16F16::from_num(TRAVEL_MM)),
             compensated: false,
         };
-        Step { excitation, prompt: None }
+        ProgrammeStep { excitation, prompt: None }
     }
 }
 

@@ -9,7 +9,7 @@ use device_sim::session::{self, Publisher, Session, Source};
 use recording::run_stats::RunStats;
 use server::outlets::Outlets;
 use server::realtime_clock::RealtimeClock;
-use server::run_loop::{Outcome, RunLoop};
+use server::run_loop::{RunLoop, RunOutcome};
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
@@ -27,7 +27,7 @@ pub(crate) fn open() -> (Session, Publisher) {
 /// The result of a run.
 pub(crate) struct Paced {
     /// Its totals.
-    pub(crate) outcome: Outcome,
+    pub(crate) outcome: RunOutcome,
     /// The lag of the control path behind the clock, every 100 ms, in ascending order.
     pub(crate) late: Vec<Duration>,
 }

@@ -5,7 +5,7 @@
 mod figures;
 
 use crate::score::gesture::{Gesture, RATE_HZ};
-use crate::score::target::{Outcome, Reached};
+use crate::score::target::{Reached, TargetOutcome};
 use crate::score::tasks::TaskResult;
 use crate::score::{Insertion, Judge, Span, each};
 use control_core::TICK_HZ;
@@ -127,7 +127,7 @@ pub fn html(attempts: &[Attempt], expert: &[Attempt]) -> Option<String> {
 fn best(attempts: &[Attempt]) -> Option<&Attempt> {
     let failed = |one: &Insertion| {
         let reached = match &one.target {
-            Some(target) => target.outcome == Outcome::Reached,
+            Some(target) => target.outcome == TargetOutcome::Reached,
             None => one.punctures > 0,
         };
         !reached || one.spared_hits > 0 || one.through_far_wall
@@ -264,11 +264,11 @@ fn of_target(target: &Reached) -> String {
     };
     let name = &target.name;
     let said = match target.outcome {
-        Outcome::Missed => format!("The {name} was missed."),
-        Outcome::Reached => {
+        TargetOutcome::Missed => format!("The {name} was missed."),
+        TargetOutcome::Reached => {
             format!("The {name} was reached and held for {} s.", decimal(target.time_s, 1))
         }
-        Outcome::Beyond => {
+        TargetOutcome::Beyond => {
             format!(
                 "The {name} was reached, and the needle went on beyond it; {} s in it.",
                 decimal(target.time_s, 1)
@@ -320,10 +320,10 @@ mod tests {
             let target = Reached { name: "bursa".into(), outcome, time_s: 0.74, passed_beside };
             in_words(&Insertion { target: Some(target), ..Insertion::default() }).join(" ")
         };
-        assert_eq!(of(Outcome::Missed, 1), "The bursa was missed. The needle passed beside it once.");
-        assert_eq!(of(Outcome::Reached, 0), "The bursa was reached and held for 0.7 s.");
+        assert_eq!(of(TargetOutcome::Missed, 1), "The bursa was missed. The needle passed beside it once.");
+        assert_eq!(of(TargetOutcome::Reached, 0), "The bursa was reached and held for 0.7 s.");
         assert!(
-            of(Outcome::Beyond, 2)
+            of(TargetOutcome::Beyond, 2)
                 .contains("went on beyond it; 0.7 s in it. The needle passed beside it twice.")
         );
     }

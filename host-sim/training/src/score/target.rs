@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 /// The outcome for a target.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Outcome {
+pub enum TargetOutcome {
     /// The tip was never in it.
     #[default]
     Missed,
@@ -29,7 +29,7 @@ pub struct Reached {
     /// Its name.
     pub name: String,
     /// Its outcome.
-    pub outcome: Outcome,
+    pub outcome: TargetOutcome,
     /// Time in it, all visits together, s.
     pub time_s: f64,
     /// The number of times that the tip passed its depth outside it.
@@ -66,18 +66,18 @@ pub(super) fn walk(
     for event in events.iter().filter(|event| (begin..=end).contains(&event.tick)) {
         let tick = event.tick;
         if enters(&event.kind, target.layer, target.has_wall)
-            || leaves_below(&event.kind, target.below) && found.outcome != Outcome::Missed
+            || leaves_below(&event.kind, target.below) && found.outcome != TargetOutcome::Missed
         {
             if is_there(tick) {
                 since = since.or(Some(tick));
-                found.outcome = if beyond { Outcome::Beyond } else { Outcome::Reached };
+                found.outcome = if beyond { TargetOutcome::Beyond } else { TargetOutcome::Reached };
             } else {
                 found.passed_beside += 1;
             }
         } else if target.below.is_some_and(|(layer, has_wall)| enters(&event.kind, layer, has_wall)) {
             beyond |= since.is_some();
             visits.extend(since.take().map(|since| (since, tick)));
-            found.outcome = if beyond { Outcome::Beyond } else { found.outcome };
+            found.outcome = if beyond { TargetOutcome::Beyond } else { found.outcome };
         } else if event.kind == (EventKind::Exit { layer: target.layer }) {
             visits.extend(since.take().map(|since| (since, tick)));
         }
@@ -158,9 +158,9 @@ mod tests {
     fn a_target_is_reached_with_its_time() {
         let told = [(0, Contact { layer: 0 }), (100, Contact { layer: 3 }), (400, Exit { layer: 3 })];
         let found = judge(&told, &bursa(None), |_| 0.0);
-        assert_eq!((found.outcome, found.passed_beside), (Outcome::Reached, 0));
+        assert_eq!((found.outcome, found.passed_beside), (TargetOutcome::Reached, 0));
         assert!((found.time_s - 0.3).abs() < 1e-9);
-        assert_eq!(judge(&told[..1], &bursa(None), |_| 0.0).outcome, Outcome::Missed);
+        assert_eq!(judge(&told[..1], &bursa(None), |_| 0.0).outcome, TargetOutcome::Missed);
         // Until the end where it is not left.
         assert!((judge(&told[..2], &bursa(None), |_| 0.0).time_s - 0.9).abs() < 1e-9);
     }
@@ -175,7 +175,7 @@ mod tests {
             (700, Exit { layer: 3 }),
         ];
         let found = judge(&told, &bursa(None), |_| 0.0);
-        assert!(found.outcome == Outcome::Beyond && (found.time_s - 0.3).abs() < 1e-9, "{found:?}");
+        assert!(found.outcome == TargetOutcome::Beyond && (found.time_s - 0.3).abs() < 1e-9, "{found:?}");
     }
 
     /// The tip first passes next to the target, at 26 mm along the skin, and is then redirected to
@@ -190,10 +190,10 @@ mod tests {
         ];
         let along = |tick: u64| if tick < 300 { 26.0 } else { 20.0 };
         let found = judge(&told, &bursa(Some((12.0, 24.0))), along);
-        assert_eq!((found.outcome, found.passed_beside), (Outcome::Reached, 1));
+        assert_eq!((found.outcome, found.passed_beside), (TargetOutcome::Reached, 1));
         assert!((found.time_s - 0.1).abs() < 1e-9, "{found:?}");
         let missed = judge(&told[..2], &bursa(Some((12.0, 24.0))), along);
-        assert_eq!((missed.outcome, missed.passed_beside), (Outcome::Missed, 1));
+        assert_eq!((missed.outcome, missed.passed_beside), (TargetOutcome::Missed, 1));
     }
 
     #[test]
@@ -201,7 +201,7 @@ mod tests {
         let lumen =
             Goal { name: "lumen".into(), layer: 2, has_wall: true, below: Some((3, true)), reach_mm: None };
         let touched = [(100, Contact { layer: 2 }), (200, Exit { layer: 2 })];
-        assert_eq!(judge(&touched, &lumen, |_| 0.0).outcome, Outcome::Missed);
+        assert_eq!(judge(&touched, &lumen, |_| 0.0).outcome, TargetOutcome::Missed);
         let told = [
             (100, Contact { layer: 2 }),
             (150, Puncture { layer: 2 }),
@@ -209,7 +209,7 @@ mod tests {
             (400, Puncture { layer: 3 }),
         ];
         let found = judge(&told, &lumen, |_| 0.0);
-        assert!(found.outcome == Outcome::Beyond && (found.time_s - 0.25).abs() < 1e-9, "{found:?}");
+        assert!(found.outcome == TargetOutcome::Beyond && (found.time_s - 0.25).abs() < 1e-9, "{found:?}");
     }
 
     #[test]
