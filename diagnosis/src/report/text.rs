@@ -30,16 +30,8 @@ pub(crate) fn rejection(why: &Rejection) -> String {
             100.0 * share,
             100.0 * LEAST_SHARE
         ),
-        Rejection::SmallAndUnsure { share, least, z } => format!(
-            "it explains {:.1} % of what the noise leaves, and effects below {:.0} % need a gain of {CERTAIN_Z} standard errors; this one has {z:.1}",
-            100.0 * share,
-            100.0 * least
-        ),
-        Rejection::Immaterial { part } => format!(
-            "it takes {:.1} % off the held-out force error, less than the {:.0} % that make it material",
-            100.0 * part.max(0.0),
-            100.0 * MATERIAL
-        ),
+        Rejection::SmallAndUnsure { share, least, z } => small_and_unsure(*share, *least, *z),
+        Rejection::Immaterial { part } => immaterial(*part),
         Rejection::NotPeriodic => {
             "its orders follow one another without a gap, as at places along the travel, not at teeth or poles"
                 .into()
@@ -72,6 +64,22 @@ pub(crate) fn rejection(why: &Rejection) -> String {
             format!("{} explains more by {z:.1} standard errors", winner.in_words())
         }
     }
+}
+
+fn small_and_unsure(share: f64, least: f64, z: f64) -> String {
+    format!(
+        "it explains {:.1} % of what the noise leaves, and effects below {:.0} % need a gain of {CERTAIN_Z} standard errors; this one has {z:.1}",
+        100.0 * share,
+        100.0 * least
+    )
+}
+
+fn immaterial(part: f64) -> String {
+    format!(
+        "it takes {:.1} % off the held-out force error, less than the {:.0} % that make it material",
+        100.0 * part.max(0.0),
+        100.0 * MATERIAL
+    )
 }
 
 fn other_force(on_fit: f64, on_holdout: f64) -> String {

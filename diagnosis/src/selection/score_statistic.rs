@@ -41,7 +41,7 @@ fn added_inputs(
     effect_inputs(track, effect, command, track.bias, || track.drive(before.as_deref()))
 }
 
-/// ScoreSums that a score test needs: information of the terms with the model projected out, and their
+/// Sums that a score test needs: information of the terms with the model projected out, and their
 /// score.
 pub(crate) struct ScoreSums {
     pub(crate) information: Square,
