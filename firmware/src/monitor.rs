@@ -178,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn a_current_on_its_way_to_its_command_is_none() {
+    fn a_current_on_its_way_to_its_command_does_not_count() {
         let mut monitor = DriveMonitor::new();
         let mut code = 2048;
         for look in 0..40 {

@@ -258,7 +258,7 @@ fn events(device: &mut Device, counts: &[i32]) -> Vec<EventKind> {
 }
 
 #[test]
-fn a_needle_that_goes_in_and_out_is_told_layer_by_layer() {
+fn a_needle_in_and_out_is_reported_layer_by_layer() {
     let mut device = Device::in_session();
     // 7 mm in, and out again.
     let seen = events(&mut device, &[450, -50]);

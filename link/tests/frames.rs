@@ -301,7 +301,7 @@ fn a_patient_never_changes_the_device_but_may_be_dismissed() {
 }
 
 #[test]
-fn a_fault_is_told_and_told_again_after_a_reconnection() {
+fn a_fault_is_reported_and_again_after_a_reconnection() {
     let mut bench = Bench::new();
     let _ = bench.send(Command::Hello { version: PROTOCOL_VERSION });
     assert_eq!(bench.send(Command::Start), Ok(()));

@@ -297,7 +297,7 @@ mod tests {
     }
 
     #[test]
-    fn a_program_is_shown_every_file_and_its_failure_is_told() {
+    fn a_program_is_shown_every_file_and_its_failure_reported() {
         let paths = Paths { rig: "r".into(), fit: vec!["a".into(), "b".into()], holdout: vec!["h".into()] };
         let program = |line: &str| Program { line: line.into(), patience: Duration::from_secs(5) };
         let words = program("t --fit {fit} --holdout {holdout} --rig {rig}").words(&paths, Path::new("o"));

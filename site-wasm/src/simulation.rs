@@ -52,7 +52,7 @@ impl Simulation {
         })
     }
 
-    /// Moves time on, as host-sim's station does it with a virtual device.
+    /// Moves time on, as host-sim's run loop does it with a virtual device.
     pub fn advance(&mut self, ticks: u64) {
         let end = self.device.ticks() + ticks;
         while self.device.ticks() < end {

@@ -70,7 +70,7 @@ pub(crate) fn check() -> Result<(), Error> {
 /// A crate of the PC's side with more floors than [`MOST_FLOORS`].
 fn too_high(name: &str, floors: usize) -> Option<String> {
     (name.starts_with("host-sim") && floors > MOST_FLOORS).then(|| {
-        format!("{name}: {floors} files stand one on the other, and {MOST_FLOORS} may: take a part out of it")
+        format!("{name}: {floors} levels of files depend on each other, and {MOST_FLOORS} may: take a part out of it")
     })
 }
 

@@ -245,7 +245,7 @@ mod tests {
     }
 
     #[test]
-    fn code_is_no_prose() {
+    fn code_is_not_read_as_prose() {
         assert!(lines("a.rs", "for verily in verily { let c = '\"'; quite(so) }").is_empty());
         assert_eq!(lines("a.rs", "let c = '\"'; // verily\nlet r = r#\"a \"verily\" \"#;"), [1, 2]);
         assert_eq!(lines("a.rs", "fn f<'a>(x: &'a str) {} /* verily /* so */ verily */"), [1, 1]);

@@ -68,7 +68,7 @@ impl Needle {
 const COUNT_MM: f64 = 0.016;
 
 #[test]
-fn the_vein_lies_at_its_depth_over_the_sine_of_the_angle() {
+fn the_vein_is_at_its_depth_over_the_sine_of_the_angle() {
     for degrees in [10.0, 15.0, 22.0, 30.0, 45.0, 60.0, 75.0, 90.0_f64] {
         let (contacts, _) =
             Needle::new(&Config::commissioned_virtual(), degrees).met(4.8 / degrees.to_radians().sin() + 1.0);

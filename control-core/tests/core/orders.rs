@@ -92,7 +92,7 @@ fn a_stop_takes_torque_away_and_does_not_clear_a_fault() {
 }
 
 #[test]
-fn the_first_of_two_faults_is_told() {
+fn the_first_of_two_faults_is_reported() {
     let mut c = started_at(0);
     c.order(Order::Trip(Fault::Tilt));
     c.order(Order::Trip(Fault::Overrun));
@@ -194,7 +194,7 @@ fn a_pc_silent_for_longer_than_the_heartbeat_time_trips() {
 }
 
 #[test]
-fn the_torque_limit_is_told_when_it_holds_torque_down() {
+fn the_torque_limit_is_reported_when_it_reduces_torque() {
     let mut config = Config::commissioned_virtual();
     // 1.005 N; the wall alone asks for 1.0 N, and damping at 50 mm/s for 0.025 N.
     config.device.limits.torque = MillinewtonMetres(I16F16::from_num(10.05));

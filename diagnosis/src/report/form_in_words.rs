@@ -332,7 +332,7 @@ mod tests {
     }
 
     #[test]
-    fn forms_over_the_speed_are_told_as_an_engineer_would() {
+    fn forms_over_the_speed_read_as_an_engineer_writes() {
         let of = |force: &dyn Fn(f64, f64) -> f64| told(None, |_, v, way| force(v, way));
         assert_eq!(of(&|v, _| -v * v.abs()), "a force against the motion that grows with speed");
         assert_eq!(
@@ -376,7 +376,7 @@ mod tests {
     }
 
     #[test]
-    fn forms_without_a_speed_are_told_along_their_variable() {
+    fn forms_without_a_speed_are_given_along_their_variable() {
         let of = |over: Vec<Variable>, grid: Vec<Vec<f64>>, force: Vec<f64>| {
             let visits = vec![1.0; force.len()];
             sentence(&Table { over, grid, force }, &visits, "m")

@@ -35,7 +35,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_inertia_is_told_where_it_is_far_and_a_skew_where_it_shows() {
+    fn a_far_inertia_and_a_visible_skew_are_reported() {
         let near = Moved { late_rows: None, inertia_by_gain: 1.1, deviations: -0.6 };
         assert!(notes(&near).is_empty());
         assert!(notes(&Moved { late_rows: Some(0.002), ..near }).is_empty());

@@ -92,7 +92,7 @@ mod tests {
     }
 
     #[test]
-    fn what_remains_is_told_against_the_sensors_noise() {
+    fn the_rest_is_compared_with_the_sensors_noise() {
         let said = |noise| report(Verdict::MissingPhysics, noise).remains;
         assert!(said(0.05 / 19.0).starts_with(
             "5.0 % of the force on held-out recordings, 19 times the sensor's noise: a further"

@@ -105,7 +105,7 @@ mod tests {
     use crate::effects::{Effect, EffectName as N};
 
     #[test]
-    fn what_one_speed_one_length_and_less_than_a_turn_cannot_tell() {
+    fn one_speed_one_length_and_part_of_a_turn_exclude_effects() {
         let rich = Excitation { speeds: 50.0, strokes: 20.0, turns: 9.0 };
         let twins = [
             (Excitation { speeds: 1.5, ..rich }, N::StribeckFriction, N::QuadraticDrag),

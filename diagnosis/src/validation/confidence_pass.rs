@@ -283,7 +283,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_does_not_stand_alone_is_no_surer_than_what_it_rests_on() {
+    fn an_effect_that_needs_another_is_no_surer_than_it() {
         let drift = EffectName::FrictionDrift;
         assert_eq!(resting(0.92, 0.65, drift, &[]), 0.65);
         assert_eq!(resting(0.92, 0.65, drift, &[drift]), 0.92);

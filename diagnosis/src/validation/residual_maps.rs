@@ -251,7 +251,7 @@ mod tests {
     }
 
     #[test]
-    fn a_map_repeats_where_each_recording_is_told_by_the_others() {
+    fn a_map_repeats_where_the_others_predict_each_recording() {
         let stiffness = || seen(|x, _| x);
         assert!(repeats(&[stiffness(), stiffness()]));
         assert!(!repeats(&[stiffness(), seen(|x, _| -x)]));

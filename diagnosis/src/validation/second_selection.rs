@@ -107,7 +107,7 @@ mod tests {
     }
 
     #[test]
-    fn a_second_name_beside_one_that_both_give_is_none() {
+    fn a_second_name_with_one_that_both_give_does_not_count() {
         let both = compared(&[N::CommandDelay, N::TorqueRipple], &[(N::CommandDelay, 0.4)]);
         assert_eq!((both[0].instead, both[1].instead), (None, Some(N::CommandDelay)));
         let unknown = compared(&[N::CommandDelay, N::DriveCompliance], &[(N::CommandDelay, 0.4)]);

@@ -39,7 +39,7 @@ fn a_start_in_motion_leaves_no_force_in_any_unit() {
 }
 
 #[test]
-fn a_free_swing_needs_no_command_and_tells_its_gravity() {
+fn a_free_swing_needs_no_command_and_shows_its_gravity() {
     let pendulum =
         Machine { inertia: 0.02, viscous: 4e-4, forward: 4e-3, backward: 4e-3, gravity: 0.7, ..AXIS };
     let swing = |start: f64, seed| {

@@ -60,7 +60,7 @@ fn said(peak: f64) -> Outcome {
 }
 
 #[test]
-fn friction_at_the_start_of_moves_shows_beside_holds() {
+fn friction_at_the_start_of_moves_shows_despite_holds() {
     let outcome = said(6.0);
     assert!(names(&outcome).contains(&N::StribeckFriction), "{}", outcome.report.sentence);
     let peak = outcome.report.effects[0].parameters["peak"].value;

@@ -4,7 +4,8 @@ use diagnosis::effects::EffectName;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Folders from the bottom to the top.
+/// Folders from the bottom to the top. Folders are counted, not files as in the small crates of
+/// host-sim: an arrow within a folder stays within its subject.
 const FLOORS: [&str; 9] = [
     "numerics",
     "effects",
@@ -78,7 +79,7 @@ fn each_folder_uses_only_those_before_it() {
 const BESIDE: [&str; 2] = ["lib.rs", "thresholds.rs"];
 
 #[test]
-fn only_thresholds_stands_beside_the_folders() {
+fn only_thresholds_is_next_to_the_folders() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
     for entry in fs::read_dir(&root).expect("the folder is there") {
         let name = entry.expect("its entries can be read").file_name();
@@ -136,7 +137,7 @@ fn names_effect(line: &str, aliases: &[String], variants: &[String]) -> bool {
 }
 
 #[test]
-fn what_an_effect_is_stands_in_its_file() {
+fn the_definition_of_an_effect_is_in_its_file() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
     let variants = variants();
     let mut files = Vec::new();

@@ -13,7 +13,7 @@ fn pushed(machine: Machine, model: &str) -> Outcome {
 }
 
 #[test]
-fn dry_friction_is_named_beside_a_push_that_has_no_name() {
+fn dry_friction_is_named_with_a_push_that_has_no_name() {
     let machine = Machine { push: 2.0, forward: 6.0, backward: 6.0, ..AXIS };
     let outcome = pushed(machine, "inertia = 2.0\nviscous = 8.0");
     assert!(names(&outcome).contains(&N::CoulombFriction), "{}", outcome.report.sentence);
@@ -52,7 +52,7 @@ fn a_drive_that_loses_more_than_half_its_force_drifts() {
 }
 
 #[test]
-fn friction_beside_gravity_a_thousand_times_larger_is_named() {
+fn friction_under_gravity_a_thousand_times_larger_is_named() {
     let machine = Machine { gravity: 400.0, forward: 1.5, backward: 1.5, disturbance: 0.002, ..AXIS };
     let taken = |seed: u64| record(machine, Taken { counts: 2e4, ..BENCH }, seed, mixed(300.0, seed as f64));
     let rig = rig("inertia = 2.0\nviscous = 8.0", "", "", 2e4);

@@ -150,7 +150,7 @@ fn a_drift_is_relative_to_the_actual_friction() {
 }
 
 #[test]
-fn a_profile_that_is_narrow_beside_the_travel_is_named() {
+fn a_profile_that_is_narrow_for_the_travel_is_named() {
     let outcome = run(&rig(OFF, OFFSET), &Setup { closed: true, size: 2.0, ..setup("sticky_place") });
     let names: Vec<&str> = outcome.report.effects.iter().map(|e| e.name.as_str()).collect();
     assert_eq!(names, ["position_dependent_damping"], "{}", outcome.summary());
@@ -208,7 +208,7 @@ fn a_lossy_gear_is_no_effect_of_the_library() {
 }
 
 #[test]
-fn what_has_no_name_is_told_where_it_alone_explains_most() {
+fn a_nameless_force_is_reported_where_it_explains_most() {
     for (effect, seed, told) in [
         ("creeping_spring", 5, "a spring that creeps, whose force fades within 0.6 s, would explain 99 %"),
         ("heavier_load", 6, "a load that changes at once, at 5.4 s, would explain"),
@@ -260,7 +260,7 @@ fn keep(recording: &mut Recording, which: impl Fn(usize) -> bool) {
 }
 
 #[test]
-fn what_cannot_tell_is_not_named() {
+fn effects_without_excitation_are_not_named() {
     type Change = Box<dyn Fn(&mut Recording)>;
     let cases: Vec<(&str, Change)> = vec![
         ("constant command", Box::new(|r| r.command.fill(0.1))),

@@ -244,7 +244,7 @@ fn of_two_slots_the_one_with_the_later_number_counts() {
 }
 
 #[test]
-fn damage_is_told_whichever_slot_has_it() {
+fn damage_is_reported_whichever_slot_has_it() {
     let mut damaged = saved([20]);
     damaged.words[0][5] ^= 4;
     let blank = Flash::new();

@@ -49,7 +49,7 @@ fn an_input_travels_however_short_it_has_to_be() {
 }
 
 #[test]
-fn fast_forces_tell_a_delay_from_a_lag() {
+fn fast_forces_distinguish_a_delay_from_a_lag() {
     let design = design(&delay_or_lag(), 12.0, 1).expect("the limits are wide");
     // Ramps end at once, which is as fast as sines of some hundred hertz.
     let is_fast = |signal: &Signal| match signal {
@@ -90,7 +90,7 @@ fn a_slow_log_of_a_heavy_joint_gets_what_it_can_show() {
 }
 
 #[test]
-fn rivals_that_are_the_same_are_told_apart_by_nothing() {
+fn rivals_that_are_the_same_cannot_be_distinguished() {
     let lag = || effect(EffectName::ElectricalLag, &[("time_constant", 2e-3)], &[]);
     let case = case(vec![rival("one", 0.5, vec![lag()]), rival("other", 0.5, vec![lag()])]);
     let design = design(&case, 6.0, 1).expect("the limits are wide");
@@ -100,7 +100,7 @@ fn rivals_that_are_the_same_are_told_apart_by_nothing() {
 }
 
 #[test]
-fn a_rival_that_can_imitate_by_other_values_is_not_told_apart() {
+fn a_rival_that_imitates_by_other_values_stays() {
     // The same friction as a value of the rig and as an effect: unequal as they are, equal once
     // refitted.
     let mut less = rival("less", 0.5, Vec::new());

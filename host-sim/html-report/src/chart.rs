@@ -234,7 +234,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ticks_are_round_and_lie_within() {
+    fn ticks_are_round_and_within_the_range() {
         let scale = Scale::rounded(-0.13, 2.9);
         assert_eq!((scale.low, scale.decimals), (-1.0, 0));
         assert_eq!(scale.ticks(), [-1.0, 0.0, 1.0, 2.0, 3.0]);

@@ -70,7 +70,7 @@ mod tests {
     }
 
     #[test]
-    fn decimals_tell_neighbours_apart() {
+    fn decimals_distinguish_neighbours() {
         assert_eq!([50.0, 1.0, 0.5, 0.1, 0.02, 1e-3].map(decimals), [0, 0, 1, 1, 2, 3]);
     }
 

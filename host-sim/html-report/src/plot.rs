@@ -107,7 +107,7 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_maps_its_range_and_tells_it_to_the_script() {
+    fn a_frame_maps_its_range_and_passes_it_to_the_script() {
         let mut out = String::new();
         let at = frame(&mut out, (0.0, 10.0), (-1.0, 1.0), "time, s", "force <N>");
         close(&mut out, "time, s");

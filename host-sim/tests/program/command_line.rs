@@ -274,7 +274,7 @@ fn killed_recordings_are_readable_interrupted_ones_complete() {
 /// went silent.
 #[cfg(unix)]
 #[test]
-fn a_program_that_stands_still_for_a_while_goes_on_where_it_was() {
+fn a_program_that_pauses_goes_on_where_it_was() {
     let child = host_sim(&["run", "--headless", "--seconds", "4"]).stdout(Stdio::piped()).spawn();
     let child = child.expect("the program starts");
     for _ in 0..3 {

@@ -85,7 +85,7 @@ fn the_example_of_settle_prints_as_quoted() {
 
 #[cfg(unix)]
 #[test]
-fn the_first_commands_run_as_they_stand() {
+fn the_first_commands_run_unchanged() {
     let dir = folder("guide-log");
     // A torque-controlled joint with friction that nobody wrote down, logged twice at 200 Hz.
     let truth = Rig::parse(
@@ -152,7 +152,7 @@ fn line_is_quoted(line: &str, quoted: &str) -> bool {
 
 #[cfg(unix)]
 #[test]
-fn the_commands_of_the_training_guide_run_as_they_stand() {
+fn the_commands_of_the_training_guide_run_unchanged() {
     let dir = folder("guide-training");
     let commands = &blocks(TRAINING, "# Training: patients, procedures, scores, debrief, papers")[0];
     let commands = commands.replace("cargo run --release -- ", "host-sim ");

@@ -199,7 +199,7 @@ fn damaged_hdf5_is_refused_or_read_and_never_panics() {
 
 #[cfg(not(feature = "ros"))]
 #[test]
-fn a_ros_2_bag_is_told_which_build_reads_it() {
+fn a_ros_2_bag_is_refused_with_the_build_that_reads_it() {
     let bag = foreign("ros2-bag");
     let output = host_sim(&["import", text(&bag), "--out", text(&folder("import-no-ros"))]).output();
     let output = output.expect("it runs");

@@ -100,7 +100,7 @@ const UNREAD_HDF5: &str = "is not a usable HDF5 file";
 const UNREAD_HDF5: &str = "save('FILE.mat', '-v7')";
 
 #[test]
-fn columns_of_one_name_are_told_apart_by_their_numbers() {
+fn columns_of_one_name_are_distinguished_by_numbers() {
     let out = &folder("import-repeated");
     let path = written(out, "repeated.csv", table("log.t,value,value").as_bytes());
     let sentence = "has several columns \"value\"; say which by its number, as in --column position=2; its columns are log.t, value (column 2), value (column 3)";

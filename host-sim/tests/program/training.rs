@@ -102,7 +102,7 @@ fn a_score_is_written_as_xapi_statements() {
 }
 
 #[test]
-fn a_needle_that_goes_through_and_one_that_is_turned_are_told() {
+fn a_needle_that_goes_through_or_is_turned_is_reported() {
     // 10 mm under the skin: beyond the far wall at 7.8 mm.
     let (_, through) = scored("through", &["--seconds", "6", "--procedure", "insertion-5mms-60deg"]);
     assert_eq!(through[0]["through_far_wall"], Value::Bool(true), "{through:?}");

@@ -61,7 +61,7 @@ fn vessel_walls_in_the_needles_plane_match_the_profile() {
 }
 
 #[test]
-fn numbers_that_are_none_are_refused_or_drawn_as_something() {
+fn numbers_that_are_not_finite_are_refused_or_drawn() {
     assert!(Picture::new(&[]).is_err());
     assert!(Picture::new(&[f32::NAN, 1.0]).is_err());
     assert!(Picture::new(&ADULT[..10]).is_err());

@@ -119,7 +119,7 @@ fn true_cogging_leaves_only_noise_for_any_encoder_zero() {
 }
 
 #[test]
-fn a_law_that_the_judge_does_not_know_is_told() {
+fn a_law_that_the_judge_does_not_know_is_reported() {
     let case = case("tilt_gravity");
     assert!(judged(&case, "[[effect]]\nname = \"magic\"\n").unwrap_err().contains("`magic`"));
 }

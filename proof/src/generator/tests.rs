@@ -344,7 +344,7 @@ fn readings_have_the_given_noise_and_warm_machines_drift() {
 }
 
 #[test]
-fn each_half_of_a_pair_shows_beside_a_missing_friction() {
+fn each_half_of_a_pair_shows_with_a_missing_friction() {
     // The friction that the rig lacks must not lend its strength to the asymmetry of it.
     for seed in [1, 4] {
         let pair = spec(Category::Pair, vec!["coulomb_friction", "asymmetric_friction"], 10.0);

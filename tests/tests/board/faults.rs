@@ -32,7 +32,7 @@ fn an_encoder_that_jumps() {
 }
 
 #[test]
-fn an_encoder_that_stands_still_under_torque() {
+fn an_encoder_that_does_not_turn_under_torque() {
     let mut rig = Rig::pressed();
     // Whatever the motor does, the count stays: not even a hand's tremor is left.
     rig.board.at_stop(|stopped| stopped.set_plant(Box::new(plant::path(vec![(0, PRESSED)]))));

@@ -6,7 +6,7 @@ use tests::board::{MILLISECOND, Wiring};
 use tests::rig::Rig;
 
 #[test]
-fn lamps_tell_torque_and_fault_on_both_boards() {
+fn lamps_show_torque_and_fault_on_both_boards() {
     for wiring in [Wiring::default(), Wiring::nucleo_f429zi()] {
         let mut rig = Rig::pressed_on(wiring);
         let lamps = |rig: &mut Rig| rig.board.at_stop(|stopped| stopped.lamps());

@@ -61,7 +61,7 @@ fn lost_counts_are_found_with_their_moment_and_number() {
 }
 
 #[test]
-fn a_single_loss_needs_other_losses_and_an_impact_is_none() {
+fn a_single_loss_needs_other_losses_unlike_an_impact() {
     let once = |t: f64| 3000.3 * t - if t < 0.6 { 0.0 } else { 3.0 };
     let any = |lost: (Vec<f64>, Vec<f64>)| lost.0.iter().any(|lost| *lost != 0.0);
     assert!(!any(lost(once, Asked::UNKNOWN)) && any(lost(once, Asked::KNOWN)));

@@ -29,7 +29,7 @@ fn may_be_named(change: impl FnOnce(&mut EffectEvidence)) -> bool {
 }
 
 #[test]
-fn beside_noise_a_share_needs_a_held_out_gain_too() {
+fn with_noise_a_share_needs_a_held_out_gain_too() {
     let by_share = |beside_noise, held_out| {
         let (name, class) = (EffectName::FrictionDrift, Vec::new());
         let material = Some(Material { name, share: 0.3, class, beside_noise });

@@ -122,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn clocks_tell_runs_apart_where_they_can() {
+    fn clocks_distinguish_runs_where_they_can() {
         assert_eq!(compare(&rows(0.0, 0.0, 5.0), &rows(0.0, 5.0, 9.0)), Clocks::Apart);
         assert_eq!(compare(&rows(0.0, 0.0, 5.0), &rows(0.0, 0.0, 6.0)), Clocks::Apart);
         assert_eq!(compare(&rows(0.0, 0.0, 5.0), &rows(0.0, 0.0, 5.0)), Clocks::Unknown);
@@ -131,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn names_tell_runs_apart_only_by_what_people_number_runs_by() {
+    fn names_distinguish_runs_only_by_numbers_of_runs() {
         for (a, b) in [
             ("run1.csv", "run2.csv"),
             ("fit.csv", "holdout.csv"),

@@ -147,7 +147,7 @@ mod tests {
     const SCALE: (f64, f64, f64, f64) = (4_000.0, 1.4069e-5, 2_048.0, 1.5e-6);
 
     #[test]
-    fn a_slow_turn_tells_the_angle_to_a_degree() {
+    fn a_slow_turn_shows_the_angle_to_a_degree() {
         // Orders without a common divisor: one place a turn.
         let waves = [(7, 5e-4, 0.9), (12, 3e-4, -2.0), (1, 1e-4, 0.3)];
         for index in [0, 123, 2_777, 3_999] {

@@ -300,7 +300,7 @@ mod tests {
     }
 
     #[test]
-    fn a_puncture_is_told_with_the_force_before_the_drop() {
+    fn a_puncture_is_reported_with_the_force_before_the_drop() {
         let event = |kind, before| Happening { event: frames::Event { tick: 20, kind }, before };
         let events = vec![
             event(EventKind::Puncture { layer: 0 }, Some(pose(10, 3.0, 1.0))),

@@ -78,7 +78,7 @@ mod tests {
     }
 
     #[test]
-    fn a_structure_that_is_none_is_refused() {
+    fn an_unsound_structure_is_refused() {
         let shoulder = BUILT_IN.iter().find(|(name, _)| *name == "shoulder").expect("it is built in").1;
         for (right, wrong, hint) in [
             ("from_mm = 9.0", "from_mm = 19.0", "reaches from 19 to 13 mm"),

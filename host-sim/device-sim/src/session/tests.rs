@@ -22,7 +22,7 @@ fn scene() -> Scene {
 }
 
 #[test]
-fn a_slow_looker_loses_the_oldest_and_is_told_how_many() {
+fn a_slow_looker_loses_the_oldest_and_learns_how_many() {
     let (session, publisher) = open(scene());
     let (mut slow, mut quick) = (session.subscribe(), session.subscribe());
     let block = [Sample::default(); 32];

@@ -238,7 +238,7 @@ mod tests {
     }
 
     #[test]
-    fn mistakes_are_told_with_file_and_line() {
+    fn mistakes_are_reported_with_file_and_line() {
         let good = csv(5.0, "45");
         for (wrong, hints) in [
             (good.replacen("depth_mm", "deep_mm", 1), ["line 1", "depth_mm"]),

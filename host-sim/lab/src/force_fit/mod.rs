@@ -243,7 +243,7 @@ mod tests {
     }
 
     #[test]
-    fn held_out_takes_are_told_down_to_their_noise() {
+    fn held_out_takes_are_predicted_down_to_their_noise() {
         let fit = fit(five_cells(3), &[]).expect("there is something to fit");
         assert_eq!((fit.table.speeds_mm_s.len(), fit.table.angles_deg.len()), (3, 3));
         assert_eq!(fit.judged.len(), 15);
@@ -274,7 +274,7 @@ mod tests {
     }
 
     #[test]
-    fn values_that_lie_together_are_one() {
+    fn values_that_are_close_together_are_one() {
         let values = [5.1, 1.0, 4.9, 3.05, 0.98, 2.95];
         let speeds = groups(values.into_iter(), |mean, v| v < mean * (1.0 + SAME_SPEED));
         assert!(speeds.iter().zip([0.99, 3.0, 5.0]).all(|(a, b)| (a - b).abs() < 1e-9) && speeds.len() == 3);

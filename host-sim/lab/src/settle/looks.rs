@@ -58,7 +58,7 @@ mod tests {
     }
 
     #[test]
-    fn a_name_that_stands_from_the_first_round_counts_twice() {
+    fn a_name_that_is_kept_from_the_first_round_counts_twice() {
         let twins = name(&["electrical_lag", "command_delay"], 0.72);
         let (names, unsure) = corrected(&[vec![twins], vec![name(&["command_delay"], 0.98)]], 5);
         assert!((names[0].confidence - 0.96).abs() < 1e-12);

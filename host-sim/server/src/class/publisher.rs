@@ -231,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn a_needle_that_stands_still_in_the_body_and_a_fault_are_told() {
+    fn a_needle_at_rest_in_the_body_and_a_fault_are_reported() {
         let (session, publisher) = open(&Profile::find("adult").unwrap(), &[]);
         let (mut subscription, mut to_class) =
             (session.subscribe(), ClassPublisher::new(Device::commissioned_virtual()));

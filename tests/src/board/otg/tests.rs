@@ -104,7 +104,7 @@ fn a_new_address_is_answered_once_the_old_one_has_its_status() {
 }
 
 #[test]
-fn a_halted_endpoint_stalls_until_it_is_told_otherwise() {
+fn a_halted_endpoint_stalls_until_it_is_cleared() {
     let mut core = ready();
     let endpoint = DIEPCTL0 + ENDPOINT_STRIDE;
     core.write(endpoint, core.in_endpoints[1].control | STALL);
