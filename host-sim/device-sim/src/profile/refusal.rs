@@ -40,12 +40,13 @@ pub(super) fn say(refusal: &plan::Refusal, file: &File) -> String {
 /// A value out of its range, for a field that the file has per degree or in degrees.
 fn in_degrees(field: Field, numbers: [I16F16; 3]) -> Option<String> {
     let degree_mrad = 1f64.to_radians() * 1e3;
-    let (key, factor, unit) = match field {
-        Field::LargestAngle => ("largest_deg", 1.0 / degree_mrad, "degrees"),
-        Field::LateralForce => ("lateral_n_per_deg", degree_mrad, "N per degree"),
+    let (key, factor, unit, parts) = match field {
+        // The device takes whole milliradians: a tenth of a degree is what the user wrote.
+        Field::LargestAngle => ("largest_deg", 1.0 / degree_mrad, "degrees", 10.0),
+        Field::LateralForce => ("lateral_n_per_deg", degree_mrad, "N per degree", 100.0),
         _ => return None,
     };
-    let [value, low, high] = numbers.map(|number| (number.to_num::<f64>() * factor * 100.0).round() / 100.0);
+    let [value, low, high] = numbers.map(|number| (number.to_num::<f64>() * factor * parts).round() / parts);
     Some(format!("{key} is {value} {unit}; it must be from {low} to {high} {unit}"))
 }
 

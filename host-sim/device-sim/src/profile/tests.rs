@@ -113,7 +113,7 @@ fn each_law_has_a_patient_whose_file_says_what_is_its_own() {
         (shoulder.replace("largest_deg = 10.0", "largest_deg = 190.0"), "largest_deg is 190 degrees"),
         (
             shoulder.replace("largest_deg = 10.0", "largest_deg = 60.0"),
-            "largest_deg is 60 degrees; it must be from 0.06 to 44.98 degrees",
+            "largest_deg is 60 degrees; it must be from 0.1 to 45 degrees",
         ),
         (shoulder.replace("site = \"shoulder\"", "site = \"elbow\""), "elbow"),
         (shoulder.replace("age_years = 50", "age_years = 130"), "patient.age_years is 130"),
