@@ -27,7 +27,7 @@ pub use law::Law;
 pub(crate) use law::{sinc, wave_mean};
 pub(crate) use load::WholeMachine;
 pub use state::State;
-pub use table::Table;
+pub use table::ForceTable;
 pub use variable::Variable;
 
 use definition::Definition;
@@ -162,7 +162,7 @@ pub struct Effect {
     pub coefficients: BTreeMap<String, f64>,
     /// The force itself, where it has no name.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub table: Option<Table>,
+    pub table: Option<ForceTable>,
 }
 
 /// An effect as a rig file has it: a formula brings its text.
@@ -182,7 +182,7 @@ struct InFile {
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     coefficients: BTreeMap<String, f64>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    table: Option<Table>,
+    table: Option<ForceTable>,
 }
 
 /// The name that a rig file gives to every formula.
@@ -242,7 +242,7 @@ impl Effect {
     }
 
     /// A force without a name; `turn` is the travel of one turn where it is over the angle.
-    pub(crate) fn tabled(table: Table, turn: Option<f64>) -> Self {
+    pub(crate) fn tabled(table: ForceTable, turn: Option<f64>) -> Self {
         let mut effect = Self::shaped(EffectName::Table, &[]);
         effect.shape.extend(turn.map(|turn| ("turn".to_owned(), turn)));
         effect.table = Some(table);

@@ -9,7 +9,7 @@ use std::f64::consts::TAU;
 /// A force over a grid, straight between its places and level beyond its ends. A place given twice
 /// is a jump.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Table {
+pub struct ForceTable {
     /// The variables: one or two.
     pub over: Vec<Variable>,
     /// Places of each variable, never falling, in its unit.
@@ -21,7 +21,7 @@ pub struct Table {
 /// Most places of a table.
 const MOST: usize = 100_000;
 
-impl Table {
+impl ForceTable {
     /// Checks that the table can be run; the reason where not.
     pub(crate) fn check(&self) -> Result<(), String> {
         if self.over.is_empty() || self.over.len() > 2 {
@@ -76,7 +76,7 @@ impl Table {
 /// A force without a name, with what it remembers.
 #[derive(Debug, Clone)]
 struct TableLaw {
-    table: Table,
+    table: ForceTable,
     /// Travel of one turn, rad or m.
     turn: f64,
     /// Sign of the velocity, and the time of its last change, s.
@@ -167,7 +167,7 @@ mod tests {
 
     #[test]
     fn a_table_is_linear_between_places_and_constant_beyond() {
-        let table = Table {
+        let table = ForceTable {
             over: vec![Variable::Speed],
             grid: vec![vec![-2.0, 0.0, 0.0, 2.0]],
             force: vec![3.0, 1.0, -1.0, -5.0],
@@ -182,7 +182,7 @@ mod tests {
 
     #[test]
     fn a_table_over_two_variables_is_straight_in_each() {
-        let table = Table {
+        let table = ForceTable {
             over: vec![Variable::Travel, Variable::Speed],
             grid: vec![vec![0.0, 1.0], vec![-1.0, 1.0, 3.0]],
             force: vec![0.0, 2.0, 4.0, 10.0, 12.0, 14.0],
@@ -194,8 +194,8 @@ mod tests {
 
     #[test]
     fn what_is_no_table_is_refused_with_the_reason() {
-        let right = Table { over: vec![Variable::Time], grid: vec![vec![0.0, 1.0]], force: vec![1.0, 2.0] };
-        let with = |change: fn(&mut Table)| {
+        let right = ForceTable { over: vec![Variable::Time], grid: vec![vec![0.0, 1.0]], force: vec![1.0, 2.0] };
+        let with = |change: fn(&mut ForceTable)| {
             let mut table = right.clone();
             change(&mut table);
             table.check().unwrap_err()

@@ -1,6 +1,6 @@
 //! A force of any form in one sentence. Nothing here knows recordings.
 
-use crate::effects::{Table, Variable};
+use crate::effects::{ForceTable, Variable};
 use crate::numerics::digits::short;
 
 /// Part of a form's mean square that counts as all of it, in words.
@@ -26,7 +26,7 @@ struct Sheet {
 
 /// The sentence, without a stop; `visits` has one weight per place of the table, `length` is the
 /// unit of the coordinate.
-pub(super) fn sentence(table: &Table, visits: &[f64], length: &str) -> String {
+pub(super) fn sentence(table: &ForceTable, visits: &[f64], length: &str) -> String {
     let speed = table.over.iter().position(|v| *v == Variable::Speed);
     let other = table.over.iter().copied().find(|v| *v != Variable::Speed);
     let columns = table.grid.last().map_or(1, Vec::len);
@@ -70,7 +70,7 @@ pub(super) fn sentence(table: &Table, visits: &[f64], length: &str) -> String {
     format!("a force{way} that {}{end}", sheet.in_words(other, length))
 }
 
-fn over(table: &Table) -> String {
+fn over(table: &ForceTable) -> String {
     let words: Vec<&str> = table.over.iter().map(|v| v.in_words()).collect();
     words.join(" and ")
 }
@@ -314,7 +314,7 @@ mod tests {
         let columns = speeds();
         let rows = other.as_ref().map_or(vec![0.0], |(_, places)| places.clone());
         let middle = columns.len() / 2;
-        let table = Table {
+        let table = ForceTable {
             force: rows
                 .iter()
                 .flat_map(|a| {
@@ -379,7 +379,7 @@ mod tests {
     fn forms_without_a_speed_are_given_along_their_variable() {
         let of = |over: Vec<Variable>, grid: Vec<Vec<f64>>, force: Vec<f64>| {
             let visits = vec![1.0; force.len()];
-            sentence(&Table { over, grid, force }, &visits, "m")
+            sentence(&ForceTable { over, grid, force }, &visits, "m")
         };
         let places = line(0.0, 1.0, 21);
         let bump = places.iter().map(|x| (-50.0 * (x - 0.5).powi(2)).exp()).collect();

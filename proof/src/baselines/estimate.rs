@@ -29,7 +29,7 @@ pub(crate) struct Row {
 
 /// One recording on an even grid.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Table {
+pub(crate) struct BaselineTable {
     pub(crate) rows: Vec<Row>,
     /// Grid points that move, thinned to the bandwidth, away from the ends.
     pub(crate) kept: Vec<usize>,
@@ -40,10 +40,10 @@ pub(crate) struct Table {
 }
 
 /// Estimates recording `k` from what the files hold: stamps, commands, counts, tilt, force.
-pub(crate) fn table(case: &Case, k: usize) -> Table {
+pub(crate) fn table(case: &Case, k: usize) -> BaselineTable {
     let source = &case.recordings[k];
     let (rate, band) = (case.machine.rate, case.machine.residual_bandwidth());
-    let (Some(first), Some(last)) = (source.first(), source.last()) else { return Table::default() };
+    let (Some(first), Some(last)) = (source.first(), source.last()) else { return BaselineTable::default() };
     let n = ((last.stamp - first.stamp) * rate) as usize;
     let [counts, commands, tilt, load] = on_even_grid(source, first.stamp, rate, n);
     let start = counts.first().copied().unwrap_or(0.0);
@@ -83,7 +83,7 @@ pub(crate) fn table(case: &Case, k: usize) -> Table {
         });
     }
     let independent = 4.0 * band * case.machine.duration;
-    Table { rows, kept, rate: rate / step as f64, band, independent }
+    BaselineTable { rows, kept, rate: rate / step as f64, band, independent }
 }
 
 /// Returns counts, commands, tilt and force of a recording at `n` points of an even grid from

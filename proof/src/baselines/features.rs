@@ -3,7 +3,7 @@
 
 use std::f64::consts::TAU;
 
-use super::estimate::{Row, Table};
+use super::estimate::{BaselineTable, Row};
 use crate::generator::case::Case;
 use crate::generator::plant::sign;
 use crate::signal::low_pass;
@@ -27,7 +27,7 @@ pub(crate) struct Feature {
 
 /// The columns of recording `k` (`usize::MAX`: the held-out one) at the kept rows: one vector a
 /// column, low-passed.
-pub(crate) fn columns(features: &[Feature], k: usize, table: &Table) -> Vec<Vec<f64>> {
+pub(crate) fn columns(features: &[Feature], k: usize, table: &BaselineTable) -> Vec<Vec<f64>> {
     features
         .iter()
         .map(|f| {
@@ -80,7 +80,7 @@ impl Builder {
 
 /// The columns for a case; the nominal ones first. Target: acceleration, as in sparse
 /// identification: a command as target would be explained by functions of the command.
-pub(crate) fn library(case: &Case, tables: &[Table]) -> Vec<Feature> {
+pub(crate) fn library(case: &Case, tables: &[BaselineTable]) -> Vec<Feature> {
     let all = || tables[..2].iter().flat_map(|t| t.rows.iter());
     let top = all().map(|r| r.speed.abs()).fold(1e-12, f64::max);
     let most = all().map(|r| r.command.abs()).fold(1e-12, f64::max);

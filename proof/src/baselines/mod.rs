@@ -13,7 +13,7 @@ use crate::key::{Category, Key};
 use crate::rng::Rng;
 use crate::share::share;
 use crate::signal::Normal;
-use estimate::Table;
+use estimate::BaselineTable;
 use features::Feature;
 
 /// The answer of a baseline to a case.
@@ -60,7 +60,7 @@ pub(crate) fn known_structure(bench: &Result<Bench, String>, key: &Key) -> Optio
 
 /// Every rival on the case.
 pub(crate) fn judge(case: &Case) -> [Opinion; 5] {
-    let tables: Vec<Table> = (0..3).map(|k| estimate::table(case, k)).collect();
+    let tables: Vec<BaselineTable> = (0..3).map(|k| estimate::table(case, k)).collect();
     let features = features::library(case, &tables);
     let base = features.iter().filter(|f| f.nominal).count();
     let columns: Vec<Vec<Vec<f64>>> = tables
@@ -116,7 +116,7 @@ fn share_of_oracle(refit: f64, left: f64, oracle: f64) -> Option<f64> {
 /// Returns the residual of the coefficients at the kept rows, and the rows' numbers.
 fn left_over<'a>(
     columns: &'a [Vec<f64>],
-    table: &'a Table,
+    table: &'a BaselineTable,
     coefficients: &'a [f64],
 ) -> impl Iterator<Item = (usize, f64)> + 'a {
     table.kept.iter().enumerate().map(move |(j, &i)| {
@@ -126,7 +126,7 @@ fn left_over<'a>(
 }
 
 /// Held-out mean square, the recording's own mean left out (its offset is its own).
-fn held_out(columns: &[Vec<f64>], table: &Table, coefficients: &[f64], field: Option<&Field>) -> f64 {
+fn held_out(columns: &[Vec<f64>], table: &BaselineTable, coefficients: &[f64], field: Option<&Field>) -> f64 {
     let (mut sum, mut squares) = (0.0, 0.0);
     for (i, mut left) in left_over(columns, table, coefficients) {
         if let Some(field) = field {
@@ -260,7 +260,7 @@ impl Field {
     }
 }
 
-fn unstructured(case: &Case, columns: &[Vec<Vec<f64>>], tables: &[Table], refit: &[f64]) -> Field {
+fn unstructured(case: &Case, columns: &[Vec<Vec<f64>>], tables: &[BaselineTable], refit: &[f64]) -> Field {
     let mut rng = Rng::new(case.spec.id as u64).fork("centres");
     let rows: Vec<([f64; 3], f64)> = (0..2)
         .flat_map(|k| {

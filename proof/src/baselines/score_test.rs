@@ -2,7 +2,7 @@
 //! free form, no held-out recording. The variance of a score is the scatter of its blocks with the
 //! candidate in the model, so that autocorrelated noise counts once.
 
-use super::estimate::Table;
+use super::estimate::BaselineTable;
 use super::features::Feature;
 use super::left_over;
 use crate::signal::Normal;
@@ -17,7 +17,7 @@ pub(super) fn select(
     features: &[Feature],
     normal: &Normal,
     columns: &[Vec<Vec<f64>>],
-    tables: &[Table],
+    tables: &[BaselineTable],
     nominal: &[usize],
 ) -> (Vec<f64>, Vec<&'static str>) {
     let groups = features.iter().map(|f| f.group).max().unwrap_or(0);
@@ -49,7 +49,7 @@ pub(super) fn select(
 fn score(
     normal: &Normal,
     columns: &[Vec<Vec<f64>>],
-    tables: &[Table],
+    tables: &[BaselineTable],
     active: &[usize],
     fitted: &[f64],
     members: &[usize],

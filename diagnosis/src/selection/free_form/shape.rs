@@ -2,13 +2,13 @@
 //! band.
 
 use super::basis::{Basis, Inputs, Point, Warp, Warps};
-use crate::effects::{Table, Variable};
+use crate::effects::{ForceTable, Variable};
 use crate::numerics::linear::Square;
 
 /// A force over a grid.
 #[derive(Debug, Clone)]
 pub(crate) struct Shape {
-    pub(crate) table: Table,
+    pub(crate) table: ForceTable,
     /// Standard deviation of each place's force, N·m or N.
     pub(crate) deviation: Vec<f64>,
     /// The number of blocks of the fitted recordings that were nearest to each place.
@@ -127,6 +127,6 @@ impl Shape {
             let first = place(0) * second;
             visits[if over.len() > 1 { first + place(1) } else { first }] += 1.0;
         }
-        Self { table: Table { over: over.to_vec(), grid: grids, force }, deviation, visits }
+        Self { table: ForceTable { over: over.to_vec(), grid: grids, force }, deviation, visits }
     }
 }

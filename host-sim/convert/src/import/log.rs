@@ -2,7 +2,7 @@
 //! for every topic. Chunks may be compressed with zstd or lz4.
 
 use super::json;
-use super::table::{Column, Log, Table};
+use super::table::{Column, ColumnTable, Log};
 use super::units;
 use device_sim::error::Error;
 use mcap::read::{LinearReader, Options};
@@ -102,7 +102,7 @@ fn tables_of(file: &str, topics: BTreeMap<u16, Topic>, mut notes: Vec<String>) -
     Ok(Log { file: file.to_owned(), tables, notes })
 }
 
-fn table(topic: Topic) -> Table {
+fn table(topic: Topic) -> ColumnTable {
     let mut time = Column::new("log_time", topic.times);
     time.unit = units::parse("s");
     let rows = time.values.len();
@@ -111,7 +111,7 @@ fn table(topic: Topic) -> Table {
         values.resize(rows, f64::NAN);
         columns.push(Column::new(format!("{}.{name}", topic.name.trim_start_matches('/')), values));
     }
-    Table { name: topic.name, columns }
+    ColumnTable { name: topic.name, columns }
 }
 
 /// The findings in a file.

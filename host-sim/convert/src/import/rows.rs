@@ -2,7 +2,7 @@
 
 use super::role::Role;
 use super::roles::{self, Choice, Chosen};
-use super::table::{Log, Table};
+use super::table::{ColumnTable, Log};
 use super::units::{Quantity, Unit};
 use device_sim::error::Error;
 use std::collections::{BTreeMap, BTreeSet};
@@ -75,7 +75,7 @@ fn unit_of_clock(name: &str, time: &[f64], notes: &mut Vec<String>) -> Result<f6
 
 /// The clock of a table, in s, and its zero.
 fn clock(
-    table: &Table,
+    table: &ColumnTable,
     choices: &[Choice],
     several: bool,
     known: Known,

@@ -38,14 +38,14 @@ impl Column {
 
 /// Columns of the same length.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Table {
+pub(super) struct ColumnTable {
     /// The topic or file, for messages.
     pub name: String,
     /// In the file's order.
     pub columns: Vec<Column>,
 }
 
-impl Table {
+impl ColumnTable {
     /// Number of rows.
     pub(super) fn rows(&self) -> usize {
         self.columns.first().map_or(0, |c| c.values.len())
@@ -58,7 +58,7 @@ pub(super) struct Log {
     /// The file, for messages.
     pub file: String,
     /// One, or one a topic.
-    pub tables: Vec<Table>,
+    pub tables: Vec<ColumnTable>,
     /// Sentences.
     pub notes: Vec<String>,
 }
@@ -71,7 +71,7 @@ impl Log {
             let place = log.tables.iter().position(|t| t.rows() == column.values.len());
             match place {
                 Some(at) => log.tables[at].columns.push(column),
-                None => log.tables.push(Table { name: file.to_owned(), columns: vec![column] }),
+                None => log.tables.push(ColumnTable { name: file.to_owned(), columns: vec![column] }),
             }
         }
         log

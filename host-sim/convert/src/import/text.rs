@@ -1,7 +1,7 @@
 //! Tables as text: any separator, decimal point or comma, comments, preambles, a row of units,
 //! dates, no header at all.
 
-use super::table::{Column, Log, Table};
+use super::table::{Column, ColumnTable, Log};
 use super::units;
 use device_sim::error::Error;
 
@@ -156,7 +156,7 @@ pub(super) fn read(file: &str, bytes: &[u8]) -> Result<Log, Error> {
             column
         })
         .collect();
-    Ok(Log { file: file.to_owned(), tables: vec![Table { name: file.to_owned(), columns }], notes })
+    Ok(Log { file: file.to_owned(), tables: vec![ColumnTable { name: file.to_owned(), columns }], notes })
 }
 
 /// Lines, each with a number.

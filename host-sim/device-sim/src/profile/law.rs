@@ -65,7 +65,7 @@ fn after_puncture() -> f64 {
 /// `[law]`.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields, tag = "model", rename_all = "kebab-case")]
-pub(super) enum Table {
+pub(super) enum LawTable {
     /// Its friction is in `[friction]`.
     Jog {},
     /// The polynomials of its walls and its cutting forces are in the layers.
@@ -158,18 +158,18 @@ pub(super) struct Cut {
 /// The law that a file's parts make, or in a sentence which key is missing or too many. Without a
 /// `[friction]`, the jog law keeps `usual`.
 pub(super) fn law(
-    table: Option<&Table>,
+    table: Option<&LawTable>,
     friction: Option<&Friction>,
     forces: Option<&Forces>,
     layers: &[Layer],
     usual: &Law,
 ) -> Result<Law, String> {
     let law = match table {
-        None | Some(Table::Jog {}) => match friction {
+        None | Some(LawTable::Jog {}) => match friction {
             Some(friction) => Law::Jog(friction.law()?),
             None => usual.clone(),
         },
-        Some(Table::Sparte { tracking_n_per_mm, relax_ms, after_puncture, friction, fixture }) => {
+        Some(LawTable::Sparte { tracking_n_per_mm, relax_ms, after_puncture, friction, fixture }) => {
             Law::Sparte(Sparte {
                 tracking: Stiffness(fix("tracking_n_per_mm", *tracking_n_per_mm)?),
                 relax_ms: *relax_ms,
@@ -179,7 +179,7 @@ pub(super) fn law(
                 fixture: fixture.fixture()?,
             })
         }
-        Some(Table::Xr { stiffness_n_per_mm, withdrawal }) => {
+        Some(LawTable::Xr { stiffness_n_per_mm, withdrawal }) => {
             let forces = forces
                 .ok_or("[force_table] is missing; law.model xr needs the table that fit-force writes")?;
             Law::Xr(forces.table(*stiffness_n_per_mm, *withdrawal)?)

@@ -250,7 +250,7 @@ struct File {
     procedure: Option<String>,
     #[serde(default)]
     patient: Person,
-    law: Option<law::Table>,
+    law: Option<law::LawTable>,
     friction: Option<law::Friction>,
     force_table: Option<law::Forces>,
     layer: Vec<Layer>,

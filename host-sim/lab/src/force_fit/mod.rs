@@ -16,7 +16,7 @@ use control_core::config::MAX_LAYERS;
 use curve::{Landmarks, Overlaid};
 use falls::{Fall, falls};
 use insertions::Insertion;
-use table::{Measured, Table};
+use table::{ForceGrid, Measured};
 
 /// Speeds that differ by less than this share are one speed of the design.
 const SAME_SPEED: f64 = 0.2;
@@ -60,7 +60,7 @@ pub fn worst_peak(judged: &[Judgement]) -> Option<f64> {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fit {
     /// The table.
-    pub table: Table,
+    pub table: ForceGrid,
     /// The insertions that it was fitted to.
     pub insertions: Vec<Insertion>,
     /// The insertions that it was judged by: those given for it, or each of the others in its turn,
@@ -88,7 +88,7 @@ pub fn fit(insertions: Vec<Insertion>, unseen: &[Insertion]) -> Option<Fit> {
     Some(Fit { table, insertions, judged })
 }
 
-fn judge(table: &Table, seen: &[Insertion], one: &Insertion, seen_n: Option<f64>) -> Judgement {
+fn judge(table: &ForceGrid, seen: &[Insertion], one: &Insertion, seen_n: Option<f64>) -> Judgement {
     let mean_square = one.points.iter().map(|p| p.1 * p.1).sum::<f64>() / one.points.len().max(1) as f64;
     let beside = |other: &Insertion| {
         (other.speed_mm_s / one.speed_mm_s - 1.0).abs() < SAME_SPEED
@@ -115,13 +115,13 @@ fn judge(table: &Table, seen: &[Insertion], one: &Insertion, seen_n: Option<f64>
 }
 
 /// Root mean square of measured less fitted, N.
-fn rms(table: &Table, one: &Insertion) -> f64 {
+fn rms(table: &ForceGrid, one: &Insertion) -> f64 {
     let curve = table.curve(one.speed_mm_s, one.angle_deg);
     let squares = one.points.iter().map(|(depth, force)| (force - curve.at(*depth)).powi(2));
     (squares.sum::<f64>() / one.points.len().max(1) as f64).sqrt()
 }
 
-fn fit_table(insertions: &[Insertion]) -> Option<Table> {
+fn fit_table(insertions: &[Insertion]) -> Option<ForceGrid> {
     let speeds = groups(insertions.iter().map(|i| i.speed_mm_s), |mean, v| v < mean * (1.0 + SAME_SPEED));
     let angles = groups(insertions.iter().map(|i| i.angle_deg), |mean, a| a < mean + SAME_ANGLE_DEG);
     let deepest = insertions.iter().flat_map(|i| i.points.iter().map(|p| p.0)).fold(0.0, f64::max);
@@ -146,7 +146,7 @@ fn fit_table(insertions: &[Insertion]) -> Option<Table> {
     };
     let cells: Vec<Vec<_>> =
         (0..speeds.len()).map(|s| (0..angles.len()).map(|a| cell(s, a)).collect()).collect();
-    Table::fit(speeds, angles, &cells)
+    ForceGrid::fit(speeds, angles, &cells)
 }
 
 /// As many falls for each insertion as most of them have, the largest ones; none for one that has

@@ -38,7 +38,7 @@ pub struct Cell {
 
 /// Force in N over perpendicular depth, speed and angle, rounded as the file holds it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Table {
+pub struct ForceGrid {
     /// mm/s, rising.
     pub speeds_mm_s: Vec<f64>,
     /// Angles to the skin in °, rising.
@@ -63,7 +63,7 @@ const ROUNDS: usize = 12;
 /// Knots of a table are at least this far apart, mm.
 const LEAST_GAP_MM: f64 = 0.05;
 
-impl Table {
+impl ForceGrid {
     /// Fits the cells that were measured, `measured[speed][angle]`, which have as many landmarks
     /// each, and fills the others. None where no cell was.
     pub fn fit(
@@ -292,7 +292,7 @@ mod tests {
         force: impl Fn(f64, f64, f64) -> f64,
         gives_way: impl Fn(f64, f64) -> f64,
         measured: impl Fn(f64, f64) -> bool,
-    ) -> Option<Table> {
+    ) -> Option<ForceGrid> {
         let cell = |v: f64, a: f64| {
             let marks = Landmarks(vec![0.0, gives_way(v, a), gives_way(v, a) + 0.1, 10.0]);
             let mut points = Overlaid::new(3);
@@ -302,14 +302,14 @@ mod tests {
         };
         let cells: Vec<Vec<_>> =
             SPEEDS.iter().map(|v| ANGLES.iter().map(|a| cell(*v, *a)).collect()).collect();
-        Table::fit(SPEEDS.to_vec(), ANGLES.to_vec(), &cells)
+        ForceGrid::fit(SPEEDS.to_vec(), ANGLES.to_vec(), &cells)
     }
 
-    fn fit(measured: impl Fn(f64, f64) -> bool) -> Table {
+    fn fit(measured: impl Fn(f64, f64) -> bool) -> ForceGrid {
         fit_to(truth, |_, _| 3.0, measured).expect("some were measured")
     }
 
-    fn worst(table: &Table, cells: impl Fn(f64, f64) -> bool) -> f64 {
+    fn worst(table: &ForceGrid, cells: impl Fn(f64, f64) -> bool) -> f64 {
         let all = SPEEDS.iter().flat_map(|v| ANGLES.iter().map(move |a| (*v, *a)));
         let mut worst: f64 = 0.0;
         for (v, a) in all.filter(|c| cells(c.0, c.1)) {
