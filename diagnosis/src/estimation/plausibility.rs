@@ -250,9 +250,9 @@ const UNITS_OF_ANGLE: [UnitOfAngle; 4] = [
     },
 ];
 
-/// The mistake in the unit of angle that all recordings share: with the angle in another unit each
-/// of them asks for the rig's inertia, and as it is for far more or less than the rig's uncertainty
-/// allows.
+/// Returns the mistake in the unit of angle that all recordings share: each of them asks for the
+/// rig's inertia if the angle is in another unit, and for an inertia that the rig's uncertainty
+/// excludes if it is not.
 pub(crate) fn unit_of_angle(all: &[&Recording], rig: &Rig) -> Option<String> {
     let knows_inertia = 3.0 * (rig.inertia_sd() + rig.gain_sd()) < TAU.ln();
     if rig.kind != Kind::Rotary

@@ -126,7 +126,7 @@ pub(crate) fn settle(nominal: &mut Nominal, tracks: &mut [BlockedRecording], noi
 /// Returns the skew, in rows, that an effect of a model represents, or that takes most of the
 /// residual of the model: missing effects may hide a skew until they are in the model. None where
 /// the nominal model allows for a skew already.
-pub(crate) fn beside(
+pub(crate) fn hidden(
     model: &Model,
     nominal: &Nominal,
     tracks: &[BlockedRecording],

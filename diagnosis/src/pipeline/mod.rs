@@ -54,7 +54,7 @@ pub(crate) fn run(
     }
     let mut prepared = prepare::prepare(rig, fit, holdout, None, progress);
     let mut found = search::search(&prepared, Vec::new(), progress);
-    if let Some(rows) = skew_beside(&prepared, &found) {
+    if let Some(rows) = hidden_skew(&prepared, &found) {
         prepared = prepare::prepare(rig, fit, holdout, Some(rows), progress);
         found = search::search(&prepared, Vec::new(), progress);
     }
@@ -71,12 +71,12 @@ pub(crate) fn run(
 
 /// The skew between command and reading, in rows, that only shows once the effects that were found
 /// are in the model, or that one of them represents.
-fn skew_beside(prepared: &Prepared, found: &Found) -> Option<f64> {
+fn hidden_skew(prepared: &Prepared, found: &Found) -> Option<f64> {
     if prepared.nominal.virtual_inertia > 0.0 {
         return None;
     }
     let FittedModel { model, noise, .. } = &found.standing.model;
-    skew::beside(model, &prepared.nominal, &found.fit, noise, prepared.scale)
+    skew::hidden(model, &prepared.nominal, &found.fit, noise, prepared.scale)
 }
 
 /// Assesses what was found; where nothing is named, what a plain selection found.

@@ -15,7 +15,7 @@ use crate::validation::rejection::Rejection;
 use crate::validation::shares::laws::AS_IT_IS;
 use crate::validation::shares::select::Selection;
 
-/// Most searches that leave a law out; each leaves out one more at least.
+/// Most searches that leave a law out; each leaves out at least one more.
 const ROUNDS: usize = 2;
 
 /// Returns what is found without the laws of the command whose force is not the missing one.
@@ -32,8 +32,8 @@ pub(super) fn without_wrong_sizes(prepared: &Prepared, mut found: Found, progres
     found
 }
 
-/// The laws of the command of the found model that have not the size that the motion shows, where
-/// other physics limits.
+/// Returns the laws of the command in the found model that do not have the size that the motion
+/// shows, if other physics limits.
 fn wrong_sizes(prepared: &Prepared, found: &Found) -> Vec<RejectedHypothesis> {
     let effects = &found.standing.effects;
     if !effects.iter().any(|one| one.effect.name.definition().command_law(&one.effect).is_some())
