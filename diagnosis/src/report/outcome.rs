@@ -72,26 +72,29 @@ pub(crate) fn sentence(report: &Report, kind: Kind) -> String {
         Verdict::NoMismatch => format!(
             "The simulation is right to within {:.1} % of the force{}",
             percent(fit.patched.holdout),
-            match remains::of_noise(report) {
-                Some(ratio) if ratio >= remains::MORE =>
-                    ", and no known effect explains a material part of that",
-                Some(_) => ", which is the sensor's noise",
-                None => "",
+            match (against_noise(report), remains::of_noise(report)) {
+                (Some(times), _) =>
+                    format!(", {times}, and no known effect explains a material part of that"),
+                (None, Some(_)) => ", which is the sensor's noise".into(),
+                (None, None) => String::new(),
             }
         ),
         Verdict::ParametersOnly => format!(
-            "The simulation has the right structure but wrong values: refitting them lowers the held-out force error from {:.1} % to {:.1} %",
+            "The simulation has the right structure but wrong values: refitting them lowers the held-out force error from {:.1} % to {:.1} %{}",
             percent(fit.nominal.holdout),
-            percent(fit.refit.holdout)
+            percent(fit.refit.holdout),
+            still(report)
         ),
         Verdict::Unexplained => format!(
-            "Simulation and recordings differ repeatably by {:.1} % of the force, and no effect is sure enough to be named{}",
+            "Simulation and recordings differ repeatably by {:.1} % of the force{}, and no effect is sure enough to be named{}",
             percent(fit.refit.holdout),
+            against_noise(report).map_or(String::new(), |times| format!(", {times}")),
             report.reason.as_ref().map_or(String::new(), |reason| format!(": {reason}"))
         ),
         Verdict::RandomDisturbance => format!(
-            "A disturbance of {:.1} % of the force acts on the axis; it does not repeat and depends on nothing that was recorded",
-            percent(fit.patched.holdout)
+            "A disturbance of {:.1} % of the force{} acts on the axis; it does not repeat and depends on nothing that was recorded",
+            percent(fit.patched.holdout),
+            against_noise(report).map_or(String::new(), |times| format!(", {times},"))
         ),
         Verdict::InsufficientExcitation => format!(
             "These recordings cannot tell: {}",
@@ -104,6 +107,18 @@ pub(crate) fn sentence(report: &Report, kind: Kind) -> String {
 fn percent_of_force(report: &Report, force: f64) -> f64 {
     let whole = report.fit.force_rms.holdout;
     if whole > 0.0 { 100.0 * force / whole } else { 0.0 }
+}
+
+/// Returns the residual against the sensor's noise, where it is more than that: `19 times the
+/// sensor's noise`.
+fn against_noise(report: &Report) -> Option<String> {
+    let ratio = remains::of_noise(report).filter(|ratio| *ratio >= remains::MORE)?;
+    Some(format!("{} the sensor's noise", remains::times(ratio)))
+}
+
+/// The same at the end of a sentence that says how an error falls.
+fn still(report: &Report) -> String {
+    against_noise(report).map_or(String::new(), |times| format!(", still {times}"))
 }
 
 /// The sentence of a verdict that names effects.
@@ -133,9 +148,7 @@ fn left_out(report: &Report, kind: Kind) -> String {
         )
     });
     let (before, after) = (percent(fit.refit.holdout), percent(fit.patched.holdout));
-    let rest = remains::of_noise(report)
-        .filter(|ratio| *ratio >= remains::MORE)
-        .map_or(String::new(), |ratio| format!(", still {} the sensor's noise", remains::times(ratio)));
+    let rest = still(report);
     if fit.holdout_gain_ci95[0] > 0.0 {
         format!(
             "The simulation leaves out {out}{region}; with it the held-out force error falls from {before:.1} % to {after:.1} %{rest}"

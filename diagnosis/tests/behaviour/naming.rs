@@ -6,6 +6,7 @@ use crate::axis::{self, AXIS, BENCH, Machine, Taken, WHOLE, diagnosed, mixed, na
 use crate::common::{self, Setup, WARM_SQUARE};
 use diagnosis::effects::EffectName as N;
 use diagnosis::{Outcome, Verdict, diagnose_recordings};
+use std::f64::consts::TAU;
 
 fn bench(effect: &'static str) -> Setup {
     Setup { effect, size: 1.0, closed: false, rate: 1000.0, seconds: 12.0, disturbance: 0.05, seed: 5 }
@@ -56,6 +57,37 @@ fn cogging_alone_is_named(counts: f64) {
         let outcome = diagnosed(&rig(WHOLE, "", "", counts), &[take(1), take(2)], &[take(3)]);
         assert_eq!(names(&outcome), [N::Cogging], "{counts} counts a radian");
     }
+}
+
+/// With less than a turn of travel, orders whose period fits in twice are searched, and the report
+/// says that the others are not.
+#[test]
+fn a_part_of_a_turn_shows_the_orders_that_fit_twice() {
+    let turn = format!("turn = {TAU}");
+    let fast = |seed: f64| move |t: f64| mixed(28.0, seed)(2.0 * t);
+    let said = |cogging: f64| {
+        let machine = Machine { cogging, ..AXIS };
+        let take = |seed| axis::record(machine, BENCH, seed, fast(seed as f64));
+        let all = [take(1), take(2), take(3)];
+        // Both fitted recordings start at the same place.
+        let counts: Vec<f64> = all[..2].iter().flat_map(|one| one.position_counts.clone()).collect();
+        let turns = range(&counts) / BENCH.counts / TAU;
+        let [one, two, holdout] = all;
+        (turns, diagnosed(&rig(WHOLE, &turn, "", BENCH.counts), &[one, two], &[holdout]))
+    };
+    let (turns, outcome) = said(6.0);
+    assert!(12.0 * turns > 2.0 && turns < 0.6, "{turns} turns hold order 12 twice");
+    assert_eq!(names(&outcome), [N::Cogging]);
+    let (turns, outcome) = said(0.0);
+    assert!(names(&outcome).is_empty());
+    let untested = outcome.report.untested.iter().find(|one| one.name == N::Cogging);
+    let said = &untested.expect("the low orders of cogging are not tested").because;
+    let highest = (2.0 / turns).ceil() - 1.0;
+    assert!(said.contains(&format!("orders 1 to {highest};")), "{said}: {turns} turns");
+}
+
+fn range(values: &[f64]) -> f64 {
+    values.iter().copied().fold(f64::MIN, f64::max) - values.iter().copied().fold(f64::MAX, f64::min)
 }
 
 #[test]

@@ -1,6 +1,10 @@
 //! MATLAB's `.mat` files of version 5 (what `save` writes without `-v7.3`, and SciPy's `savemat`):
 //! arrays and structures of arrays. The layout is that of MathWorks' "MAT-File Format": tagged
 //! elements, compressed ones within zlib.
+//!
+//! Read here, and not by a library: of those that were tried in November 2026, `matrw` 0.1.4
+//! refuses every file of SciPy by its header, and `matfile` 0.5.0 reads no structures and does not
+//! say which variables it leaves out.
 
 use super::table::{Column, Log, join};
 use device_sim::error::Error;
