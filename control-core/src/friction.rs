@@ -8,7 +8,7 @@ use fixed::types::{I2F30, I16F16};
 
 /// A law of friction ready for the tick.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Law {
+pub(crate) enum PreparedFriction {
     /// Equation 2 as printed, with the missing gain K_f.
     Paper {
         /// 1/S_f1 in 1/mm.
@@ -37,8 +37,8 @@ const STICKS_AFTER: u16 = 200;
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Hold {
     anchor: Anchor,
-    /// Ticks for which the needle still counts as sliding; 0 is at rest. Of [`Law::StickSlip`]
-    /// alone.
+    /// Ticks for which the needle still counts as sliding, 0 is at rest; only of
+    /// [`PreparedFriction::StickSlip`].
     sliding_ticks: u16,
 }
 
@@ -51,7 +51,7 @@ impl Hold {
     }
 }
 
-impl Law {
+impl PreparedFriction {
     /// One tick inside tissue. `inserted` is the length past the entry, `limit` the friction limit
     /// that the layers make there, for the law that asks.
     pub(crate) fn tick(
@@ -62,7 +62,7 @@ impl Law {
         limit: impl FnOnce() -> Newtons,
     ) -> Newtons {
         match self {
-            Law::Paper { per_level_length, level_cap, follow, stiffness, limit, least } => {
+            PreparedFriction::Paper { per_level_length, level_cap, follow, stiffness, limit, least } => {
                 anchor.follow(depth.0, *follow);
                 // 1/S_f1 is at most 1.
                 let levels = truncating_product(inserted.0.to_bits(), per_level_length.to_bits(), 30);
@@ -74,13 +74,13 @@ impl Law {
                 let force = I16F16::from_bits(saturating_product(levelled, stiffness.0.to_bits(), 16));
                 Newtons(force.min(limit.0).max(least.0))
             }
-            Law::Cone { stiffness, inverse_stiffness } => {
+            PreparedFriction::Cone { stiffness, inverse_stiffness } => {
                 let limit = limit();
                 let reach = saturating_multiply(limit.0, *inverse_stiffness);
                 anchor.drag(depth, reach, reach);
                 Newtons(saturating_multiply(anchor.stretch(depth), stiffness.0).min(limit.0).max(-limit.0))
             }
-            Law::StickSlip { stiffness, inverse_stiffness, sliding } => {
+            PreparedFriction::StickSlip { stiffness, inverse_stiffness, sliding } => {
                 let limit = limit().0;
                 let level = if *sliding_ticks > 0 { saturating_multiply(limit, *sliding) } else { limit };
                 let reach = saturating_multiply(level, *inverse_stiffness);

@@ -37,7 +37,7 @@ pub struct Plan {
     pub(crate) config: Config,
     pub(crate) scale: Scale,
     pub(crate) anatomy: Anatomy,
-    pub(crate) law: law::Plan,
+    pub(crate) law: law::PreparedLaw,
     /// Length by which a force of the law becomes the torque that is given: the roller's radius at
     /// the declared scale.
     pub(crate) lever: I16F16,
@@ -77,7 +77,7 @@ impl Plan {
             stiffest: stiffest(config),
             count: I16F16::saturating_from_num(mm_per_count),
         };
-        let law = law::Plan::new(&patient.law, &force_limits)?;
+        let law = law::PreparedLaw::new(&patient.law, &force_limits)?;
         let anatomy = layers::plan(config, &met, law.ruptures());
         let lever = device.roller_radius.0.saturating_mul(patient.scale);
         let fade_ticks = i32::from(config.device.limits.fade_in_ms.cast_signed()) * (TICK_HZ / 1000) as i32;

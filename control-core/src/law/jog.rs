@@ -3,7 +3,7 @@
 use super::{ForceLimits, LayerHit, Motion, Response, follow_share};
 use crate::anatomy::{Insertion, SMALLEST_ANGLE};
 use crate::event::State;
-use crate::friction::{self, Hold};
+use crate::friction::{Hold, PreparedFriction};
 use crate::kinematics::Direction;
 use crate::math::{reciprocal, saturating_product, saturating_times, sine, truncating_product};
 use crate::passivity::Elements;
@@ -60,7 +60,7 @@ struct Rub {
 /// The forces of the tissue ready for the tick, in the order of the [`crate::anatomy::Anatomy`]
 /// that [`crate::plan`] has made with them.
 #[derive(Clone, Debug)]
-pub(crate) struct Plan {
+pub(crate) struct PreparedJog {
     /// One entry for each wall.
     walls: Vec<wall::Wall, MAX_LAYERS>,
     /// One entry for each layer.
@@ -68,7 +68,7 @@ pub(crate) struct Plan {
     /// The needle is held by friction once the outermost wall has given way: 1, or 0 where there is
     /// none.
     walls_that_close: usize,
-    friction: friction::Law,
+    friction: PreparedFriction,
 }
 
 impl FrictionLaw {
@@ -81,7 +81,7 @@ impl FrictionLaw {
     }
 }
 
-impl Plan {
+impl PreparedJog {
     /// Checks the law of friction and all the walls with it, at whatever angle they are met.
     pub(crate) fn new(friction: &FrictionLaw, limits: &ForceLimits) -> Result<Self, Refusal> {
         check_friction(friction, limits)?;
@@ -134,7 +134,7 @@ impl Memory {
     pub(crate) fn tick(
         &mut self,
         _: &FrictionLaw,
-        forces: &Plan,
+        forces: &PreparedJog,
         met: &Insertion,
         Motion { depth, movement, .. }: Motion,
     ) -> Response {
@@ -163,7 +163,7 @@ impl Memory {
     }
 
     /// The relief of every wall that has given way, and the rise of the next one.
-    fn walls(&mut self, forces: &Plan, met: &Insertion, depth: Millimetres) -> Walls {
+    fn walls(&mut self, forces: &PreparedJog, met: &Insertion, depth: Millimetres) -> Walls {
         let mut sum = Walls::default();
         let Some(given) = forces.walls.get(..met.given()) else { return sum };
         for (index, (wall, cut)) in given.iter().zip(&mut self.cuts).enumerate() {
@@ -183,7 +183,7 @@ impl Memory {
     }
 
     /// The friction along the needle, where the tip is inside.
-    fn friction(&mut self, forces: &Plan, met: &Insertion, depth: Millimetres) -> Option<Newtons> {
+    fn friction(&mut self, forces: &PreparedJog, met: &Insertion, depth: Millimetres) -> Option<Newtons> {
         let entry = met.top(0);
         if met.given() < forces.walls_that_close || depth.0 < entry {
             self.hold = Hold::at(depth);
@@ -195,7 +195,7 @@ impl Memory {
 }
 
 /// The friction limit that the layers make at `depth`.
-fn limit(forces: &Plan, met: &Insertion, depth: Millimetres) -> Newtons {
+fn limit(forces: &PreparedJog, met: &Insertion, depth: Millimetres) -> Newtons {
     let index = met.innermost(depth);
     let Some(rub) = forces.rubs.get(index) else { return Newtons::default() };
     let inside = depth.0.saturating_sub(met.top(index));
@@ -229,10 +229,10 @@ fn check_friction(law: &FrictionLaw, limits: &ForceLimits) -> Result<(), Refusal
     }
 }
 
-fn plan_friction(law: &FrictionLaw) -> friction::Law {
+fn plan_friction(law: &FrictionLaw) -> PreparedFriction {
     match *law {
         FrictionLaw::Paper { level_length, level_cap, anchor_ms, stiffness, limit, limit_out } => {
-            friction::Law::Paper {
+            PreparedFriction::Paper {
                 per_level_length: I2F30::saturating_from_num(I2F30::ONE.wide_div(level_length.0)),
                 level_cap,
                 follow: follow_share(anchor_ms),
@@ -242,9 +242,9 @@ fn plan_friction(law: &FrictionLaw) -> friction::Law {
             }
         }
         FrictionLaw::Cone { stiffness } => {
-            friction::Law::Cone { stiffness, inverse_stiffness: I16F16::ONE.saturating_div(stiffness.0) }
+            PreparedFriction::Cone { stiffness, inverse_stiffness: I16F16::ONE.saturating_div(stiffness.0) }
         }
-        FrictionLaw::StickSlip { stiffness, sliding } => friction::Law::StickSlip {
+        FrictionLaw::StickSlip { stiffness, sliding } => PreparedFriction::StickSlip {
             stiffness,
             inverse_stiffness: I16F16::ONE.saturating_div(stiffness.0),
             sliding,

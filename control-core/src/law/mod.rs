@@ -93,7 +93,7 @@ fn reach(force: I16F16, inverse_slope: I16F16) -> I16F16 {
 }
 
 macro_rules! laws {
-    ($($(#[$about:meta])+ $name:ident($config:ident) => $module:ident),+ $(,)?) => {
+    ($($(#[$about:meta])+ $name:ident($config:ident, $prepared:ident) => $module:ident),+ $(,)?) => {
         $(mod $module;)+
         $(pub use $module::$config;)+
 
@@ -102,10 +102,10 @@ macro_rules! laws {
         #[expect(clippy::large_enum_variant, reason = "nothing allocates here")]
         pub enum Law { $($(#[$about])+ $name($config)),+ }
 
-        /// The law that is in force.
+        /// The law that is in force, checked and ready for the tick.
         #[derive(Clone, Debug)]
         #[allow(clippy::large_enum_variant, reason = "nothing allocates here, and a device has one plan")]
-        pub(crate) enum Plan { $($name($module::Plan)),+ }
+        pub(crate) enum PreparedLaw { $($name($module::$prepared)),+ }
 
         /// Its memory.
         #[derive(Clone, Debug)]
@@ -119,23 +119,23 @@ macro_rules! laws {
             }
         }
 
-        impl Plan {
+        impl PreparedLaw {
             /// Checks `law` and prepares it for the tick.
             pub(crate) fn new(law: &Law, limits: &ForceLimits) -> Result<Self, Refusal> {
-                match law { $(Law::$name(config) => $module::Plan::new(config, limits).map(Self::$name)),+ }
+                match law { $(Law::$name(config) => $module::$prepared::new(config, limits).map(Self::$name)),+ }
             }
 
             /// A bit for each layer that gives way by this law rather than by a wall of its own.
             pub(crate) fn ruptures(&self) -> u8 {
                 match self {
-                    Plan::Xr(plan) => plan.ruptures(),
-                    Plan::Jog(_) | Plan::Sparte(_) => 0,
+                    PreparedLaw::Xr(plan) => plan.ruptures(),
+                    PreparedLaw::Jog(_) | PreparedLaw::Sparte(_) => 0,
                 }
             }
 
             /// The memory of a needle that has never been in this tissue.
             pub(crate) fn memory(&self) -> Memory {
-                match self { $(Plan::$name(_) => Memory::$name($module::Memory::default())),+ }
+                match self { $(PreparedLaw::$name(_) => Memory::$name($module::Memory::default())),+ }
             }
         }
 
@@ -153,12 +153,12 @@ macro_rules! laws {
             pub(crate) fn tick(
                 &mut self,
                 law: &Law,
-                plan: &Plan,
+                plan: &PreparedLaw,
                 met: &Insertion,
                 motion: Motion,
             ) -> Response {
                 match (self, plan, law) {
-                    $((Memory::$name(memory), Plan::$name(plan), Law::$name(config)) => {
+                    $((Memory::$name(memory), PreparedLaw::$name(plan), Law::$name(config)) => {
                         memory.tick(config, plan, met, motion)
                     })+
                     // A memory is made by its plan, and a plan by its law.
@@ -171,12 +171,12 @@ macro_rules! laws {
 
 laws! {
     /// Paper 001: the jog effect of each wall, and friction in each layer.
-    Jog(FrictionLaw) => jog,
+    Jog(FrictionLaw, PreparedJog) => jog,
     /// Paper 002: walls that rise along a polynomial, tracking walls, LuGre friction, a fixture of
     /// the direction.
-    Sparte(Sparte) => sparte,
+    Sparte(Sparte, PreparedSparte) => sparte,
     /// Paper 000: a table over depth, speed and angle.
-    Xr(ForceTable) => xr,
+    Xr(ForceTable, PreparedTable) => xr,
 }
 
 pub use sparte::{Cutting, Fixture, Lugre};

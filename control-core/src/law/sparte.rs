@@ -93,7 +93,7 @@ pub struct Fixture {
 
 /// The law ready for the tick, walls in the order of the anatomy.
 #[derive(Clone, Debug)]
-pub(crate) struct Plan {
+pub(crate) struct PreparedSparte {
     walls: Vec<wall::Wall, MAX_LAYERS>,
     walls_that_close: usize,
     /// One entry for each layer.
@@ -129,7 +129,7 @@ impl Sparte {
     }
 }
 
-impl Plan {
+impl PreparedSparte {
     /// Checks what each layer asks for with friction at [`FASTEST`] on top.
     pub(crate) fn new(sparte: &Sparte, limits: &ForceLimits) -> Result<Self, Refusal> {
         check(sparte, limits)?;
@@ -174,7 +174,7 @@ impl Memory {
     pub(crate) fn tick(
         &mut self,
         config: &Sparte,
-        plan: &Plan,
+        plan: &PreparedSparte,
         met: &Insertion,
         Motion { depth, speed, movement }: Motion,
     ) -> Response {
@@ -221,7 +221,7 @@ impl Memory {
     fn track(
         &mut self,
         config: &Sparte,
-        plan: &Plan,
+        plan: &PreparedSparte,
         cut: Cutting,
         elastic: I16F16,
         (depth, has_stopped): (Millimetres, bool),
@@ -286,7 +286,7 @@ impl Rub {
 }
 
 /// The polynomial of the wall that is pushed in, where one is.
-fn pressed(plan: &Plan, met: &Insertion, depth: Millimetres) -> Option<I16F16> {
+fn pressed(plan: &PreparedSparte, met: &Insertion, depth: Millimetres) -> Option<I16F16> {
     let wall = plan.walls.get(met.given()).filter(|_| met.presses())?;
     let travel = met.travel(met.given(), depth);
     (travel >= I16F16::ZERO).then(|| wall.elastic_force(travel).0)

@@ -80,7 +80,7 @@ pub struct ForceTable {
 
 /// The values that the tick needs in addition to the table.
 #[derive(Clone, Debug)]
-pub(crate) struct Plan {
+pub(crate) struct PreparedTable {
     /// The least force from each knot and cell on: the force on the needle in its track.
     hull: Vec<u16, { MAX_DEPTHS * MAX_CELLS }>,
     knots: usize,
@@ -133,7 +133,7 @@ impl ForceTable {
     }
 }
 
-impl Plan {
+impl PreparedTable {
     /// Checks the table against what the motor gives and the stiffness that holds the needle.
     pub(crate) fn new(table: &ForceTable, limits: &ForceLimits) -> Result<Self, Refusal> {
         check::check(table, limits)?;
@@ -226,7 +226,7 @@ struct Track {
 impl Track {
     /// Follows a tip that is `at` a knot, Q16, and `along` the needle past the skin. A bit for the
     /// layer that gives way now.
-    fn follow(&mut self, plan: &Plan, at: u32, along: I16F16, angle: Milliradians) -> u8 {
+    fn follow(&mut self, plan: &PreparedTable, at: u32, along: I16F16, angle: Milliradians) -> u8 {
         let off = i64::from((i32::from(angle.0) - i32::from(self.angle.0)).abs());
         if self.given > 0 && off * i64::from(along.to_bits()) > BESIDE {
             self.leave(plan, at, angle);
@@ -251,7 +251,7 @@ impl Track {
 
     /// The tip is beside the track: what lies deeper is whole.
     #[inline(never)]
-    fn leave(&mut self, plan: &Plan, at: u32, angle: Milliradians) {
+    fn leave(&mut self, plan: &PreparedTable, at: u32, angle: Milliradians) {
         self.front = self.front.min(at);
         let is_above = |rupture: &&Rupture| (rupture.knot as u32) << 16 <= at;
         self.given = plan.ruptures.iter().take(self.given).take_while(is_above).count();
@@ -283,7 +283,7 @@ impl Memory {
     pub(crate) fn tick(
         &mut self,
         table: &ForceTable,
-        plan: &Plan,
+        plan: &PreparedTable,
         met: &Insertion,
         Motion { depth, speed, movement }: Motion,
     ) -> Response {
@@ -332,13 +332,13 @@ impl Memory {
     }
 
     /// True if the tip is where the layer that gave way last falls.
-    fn falls(&self, plan: &Plan, position: Position) -> bool {
+    fn falls(&self, plan: &PreparedTable, position: Position) -> bool {
         let last = self.track.given.checked_sub(1).and_then(|last| plan.ruptures.get(last));
         last.is_some_and(|last| last.knot == position.knot)
     }
 
     /// True if the tip pushes in the layer that gives way next.
-    fn presses(&self, plan: &Plan, met: &Insertion, depth: Millimetres) -> bool {
+    fn presses(&self, plan: &PreparedTable, met: &Insertion, depth: Millimetres) -> bool {
         plan.ruptures.get(self.track.given).is_some_and(|next| depth.0 >= met.top(next.met))
     }
 }

@@ -10,13 +10,13 @@ pub(crate) type Numbers = BTreeMap<String, f64>;
 /// A force over one or two variables: straight between its places, level beyond its ends, the last
 /// variable fastest.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Table {
+pub(crate) struct InterpolatedForce {
     pub(crate) over: Vec<String>,
     pub(crate) grid: Vec<Vec<f64>>,
     pub(crate) force: Vec<f64>,
 }
 
-impl Table {
+impl InterpolatedForce {
     /// The force at one value a variable.
     pub(crate) fn at(&self, values: &[f64]) -> f64 {
         // Every corner of the cell by its share of the way there.
@@ -61,7 +61,7 @@ pub(crate) struct Entry {
     pub(crate) name: String,
     pub(crate) shape: Numbers,
     pub(crate) coefficients: Numbers,
-    pub(crate) table: Option<Table>,
+    pub(crate) table: Option<InterpolatedForce>,
 }
 
 impl Entry {
@@ -121,7 +121,7 @@ impl Rig {
                 name: t.get("name").and_then(Value::as_str).ok_or("an [[effect]] has no name")?.to_string(),
                 shape: numbers(t.get("shape")),
                 coefficients: numbers(t.get("coefficients")),
-                table: t.get("table").map(Table::parse).transpose()?,
+                table: t.get("table").map(InterpolatedForce::parse).transpose()?,
             })
         };
         Ok(Self {
@@ -184,7 +184,7 @@ mod tests {
 
     #[test]
     fn a_table_is_straight_between_its_places_and_level_beyond() {
-        let table = Table {
+        let table = InterpolatedForce {
             over: vec!["speed".into(), "time".into()],
             grid: vec![vec![0.0, 1.0], vec![-1.0, 1.0, 3.0]],
             force: vec![0.0, 2.0, 4.0, 10.0, 12.0, 14.0],
@@ -192,7 +192,7 @@ mod tests {
         for (at, force) in [([0.0, 0.0], 1.0), ([0.5, 2.0], 8.0), ([7.0, 9.0], 14.0), ([-7.0, -9.0], 0.0)] {
             assert!((table.at(&at) - force).abs() < 1e-12, "{at:?}: {}", table.at(&at));
         }
-        let jump = Table {
+        let jump = InterpolatedForce {
             over: vec!["speed".into()],
             grid: vec![vec![-1.0, 0.0, 0.0, 1.0]],
             force: vec![-2.0, -2.0, 2.0, 2.0],

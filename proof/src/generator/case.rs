@@ -1,7 +1,7 @@
 //! One case: a machine, what is hidden in it, two recordings to fit on and one held out, and the
 //! key.
 
-use super::case_builder::{CaseBuilder, Plan};
+use super::case_builder::{CaseBuilder, RecordingPlan};
 use super::effects;
 use super::excite::{self, Kind};
 use super::family::Needs;
@@ -131,7 +131,7 @@ fn attempt_case(spec: &Spec, rng: &Rng, quick: bool) -> Option<Case> {
     let base = rng.fork("place").range(0.0, 2.0) * machine.plant.turn;
     let load = with_force.then_some(machine.plant.dry.coulomb * pick.range(0.8, 1.6));
     let around = Around { quick, base, load };
-    let (plans, referenced): (Vec<Plan>, Vec<bool>) =
+    let (plans, referenced): (Vec<RecordingPlan>, Vec<bool>) =
         (0..3).map(|k| draw_plan(spec, &machine, &around, &mut rng.fork(&format!("recording/{k}")))).unzip();
     let mut builder = CaseBuilder { spec, rng, machine, declared, base, plans };
     if spec.hidden.contains(&"command_saturation") {
@@ -216,7 +216,7 @@ struct Around {
 }
 
 /// Draws a recording, and whether the reference of its loop is recorded.
-fn draw_plan(spec: &Spec, machine: &Machine, around: &Around, own: &mut Rng) -> (Plan, bool) {
+fn draw_plan(spec: &Spec, machine: &Machine, around: &Around, own: &mut Rng) -> (RecordingPlan, bool) {
     let coulomb = machine.plant.dry.coulomb;
     let kinds = draw_kinds(spec, around.quick, own);
     let segments = excite::programme(&kinds, machine, own);
@@ -236,7 +236,7 @@ fn draw_plan(spec: &Spec, machine: &Machine, around: &Around, own: &mut Rng) -> 
         let size = coulomb * own.range(0.12, 0.4);
         rough.values.iter_mut().for_each(|x| *x *= size);
     }
-    let plan = Plan {
+    let plan = RecordingPlan {
         segments,
         warm,
         times: machine.stamps(own),

@@ -14,7 +14,7 @@ use crate::key::Category;
 use crate::rng::Rng;
 
 /// The excitation and the draws for one recording.
-pub(super) struct Plan {
+pub(super) struct RecordingPlan {
     pub(super) segments: Vec<Segment>,
     /// The time for which the machine has been running already, s.
     pub(super) warm: f64,
@@ -36,7 +36,7 @@ pub(super) struct CaseBuilder<'a> {
     pub(super) machine: Machine,
     pub(super) declared: Declared,
     pub(super) base: f64,
-    pub(super) plans: Vec<Plan>,
+    pub(super) plans: Vec<RecordingPlan>,
 }
 
 impl CaseBuilder<'_> {
@@ -72,7 +72,7 @@ impl CaseBuilder<'_> {
         &self,
         plant: &Plant,
         believed: &Believed,
-        plan: &Plan,
+        plan: &RecordingPlan,
         step: f64,
     ) -> Result<Vec<Row>, Diverged> {
         let m = &self.machine;
@@ -121,7 +121,7 @@ impl CaseBuilder<'_> {
         scales.push((i, s));
         let plant = self.plant(&scales);
         let believed = self.believed(&plant, &[(i, s)]);
-        let play = |p: &Plan| self.play(&plant, &believed, p, step);
+        let play = |p: &RecordingPlan| self.play(&plant, &believed, p, step);
         let fits: Vec<Vec<Row>> = self.plans.iter().take(2).map(play).collect::<Result<_, _>>()?;
         let rows: Vec<&[Row]> = fits.iter().map(Vec::as_slice).collect();
         let m = &self.machine;

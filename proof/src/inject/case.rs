@@ -3,7 +3,7 @@
 use super::carrier::Carrier;
 use super::conceal::{Changed, Concealed, conceal};
 use super::regress::{Block, Oracle, solve};
-use super::shapes::{self, Law, Side};
+use super::shapes::{self, HiddenLaw, Side};
 use super::sight::{Sight, State, band};
 use crate::dynamics::recording::Recording;
 use crate::rng::Rng;
@@ -76,7 +76,7 @@ impl Ground {
         }
         let force: Vec<f64> = blocks.iter().flat_map(|b| b.target.iter().copied()).collect();
         let left = super::regress::left_on(&blocks, &solve(&blocks));
-        let own = matches!(effect.law, Law::Bristles { .. }) || left > (1.0 - IMITATED) * rms(&force);
+        let own = matches!(effect.law, HiddenLaw::Bristles { .. }) || left > (1.0 - IMITATED) * rms(&force);
         (own && left.is_finite() && left > 0.0).then_some(left)
     }
 
@@ -124,7 +124,7 @@ impl Ground {
         if !changed.iter().all(usable) || !self.bearable(&effect, &changed) {
             return None;
         }
-        let coulomb = if matches!(effect.law, Law::Bristles { .. }) { effect.size } else { 0.0 };
+        let coulomb = if matches!(effect.law, HiddenLaw::Bristles { .. }) { effect.size } else { 0.0 };
         let oracle = self.oracle(&changed);
         Some(Drawn { effect, changed, coulomb, oracle })
     }
@@ -132,7 +132,7 @@ impl Ground {
     /// True if the size of the forces is plausible.
     fn bearable(&self, effect: &Concealed, changed: &[Changed]) -> bool {
         let rig = &self.carrier.rig;
-        if let Law::Eccentric = effect.law {
+        if let HiddenLaw::Eccentric = effect.law {
             return effect.size < 0.15;
         }
         if effect.law.side() == Side::Reading {

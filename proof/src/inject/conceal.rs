@@ -6,7 +6,7 @@
 use std::f64::consts::TAU;
 
 use super::rig_file::RigFile;
-use super::shapes::{Law, Side, Wave};
+use super::shapes::{HiddenLaw, Side, Wave};
 use super::sight::State;
 use crate::dynamics::recording::Recording;
 use crate::rng::Rng;
@@ -17,7 +17,7 @@ const POINTS: usize = 8;
 /// An effect with its size in one machine.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Concealed {
-    pub(crate) law: Law,
+    pub(crate) law: HiddenLaw,
     pub(crate) size: f64,
     /// Speed and travel that make the law's terms about one.
     pub(crate) fast: f64,
@@ -110,27 +110,27 @@ fn forces(effect: &Concealed, r: &Recording, state: &State, rig: &RigFile, zero:
     let side = |v: f64| if v.abs() > state.slow { v.signum() } else { 0.0 };
     let size = effect.size;
     match &effect.law {
-        Law::Viscous => means(state, |_, v, _| -size * v / fast),
-        Law::Coulomb => means(state, |_, v, _| -size * side(v)),
-        Law::OneWay(way) => means(state, |_, v, _| if v * way > 0.0 { -size * v / fast } else { 0.0 }),
-        Law::Stribeck { speed, power } => {
+        HiddenLaw::Viscous => means(state, |_, v, _| -size * v / fast),
+        HiddenLaw::Coulomb => means(state, |_, v, _| -size * side(v)),
+        HiddenLaw::OneWay(way) => means(state, |_, v, _| if v * way > 0.0 { -size * v / fast } else { 0.0 }),
+        HiddenLaw::Stribeck { speed, power } => {
             means(state, |_, v, _| -size * side(v) * (-(v.abs() / speed).powf(*power)).exp())
         }
-        Law::Bristles { length } => bristles(state, *length).iter().map(|z| -size * z).collect(),
-        Law::Drag(power) => means(state, |_, v, _| -size * v.signum() * (v.abs() / fast).powf(*power)),
-        Law::FrictionAlong(along) => means(state, |q, v, _| -size * side(v) * along.at(q)),
-        Law::DampingAlong(along) => means(state, |q, v, _| -size * v / fast * along.at(q)),
-        Law::Load => {
+        HiddenLaw::Bristles { length } => bristles(state, *length).iter().map(|z| -size * z).collect(),
+        HiddenLaw::Drag(power) => means(state, |_, v, _| -size * v.signum() * (v.abs() / fast).powf(*power)),
+        HiddenLaw::FrictionAlong(along) => means(state, |q, v, _| -size * side(v) * along.at(q)),
+        HiddenLaw::DampingAlong(along) => means(state, |q, v, _| -size * v / fast * along.at(q)),
+        HiddenLaw::Load => {
             let direction = means(state, |_, v, _| side(v));
             direction.iter().zip(&r.force).map(|(d, load)| -size * d * load.abs()).collect()
         }
-        Law::WarmingUp(seconds) => means(state, |_, v, t| -size * side(v) * (-t / seconds).exp()),
-        Law::Cogging(list) => {
+        HiddenLaw::WarmingUp(seconds) => means(state, |_, v, t| -size * side(v) * (-t / seconds).exp()),
+        HiddenLaw::Cogging(list) => {
             let rms = wave_rms(list);
             means(state, |q, _, _| size / rms * wave(list, per_turn * q, zero))
         }
-        Law::Imbalance => means(state, |q, _, _| size * (q + zero).sin()),
-        Law::Spring(cubic) => {
+        HiddenLaw::Imbalance => means(state, |q, _, _| size * (q + zero).sin()),
+        HiddenLaw::Spring(cubic) => {
             let middle = state.place.iter().sum::<f64>() / state.place.len() as f64;
             let origin = if rig.absolute { 0.0 } else { middle };
             means(state, |q, _, _| {
@@ -138,7 +138,7 @@ fn forces(effect: &Concealed, r: &Recording, state: &State, rig: &RigFile, zero:
                 -size * x * (1.0 + cubic * x * x)
             })
         }
-        Law::Weight => r.tilt.iter().map(|t| size * t.sin()).collect(),
+        HiddenLaw::Weight => r.tilt.iter().map(|t| size * t.sin()).collect(),
         _ => vec![0.0; state.time.len()],
     }
 }
@@ -168,12 +168,12 @@ fn inverted(effect: &Concealed, r: &Recording, state: &State, rig: &RigFile, zer
     let (u, size) = (&r.command, effect.size);
     let n = u.len();
     match &effect.law {
-        Law::Ripple(list) => {
+        HiddenLaw::Ripple(list) => {
             let (per_turn, rms) = (rig.turn.map_or(0.0, |turn| TAU / turn), wave_rms(list));
             let factor = means(state, |q, _, _| 1.0 + size / rms * wave(list, per_turn * q, zero));
             u.iter().zip(factor).map(|(u, f)| u / f.max(0.2)).collect()
         }
-        Law::Deadband(leak) => u
+        HiddenLaw::Deadband(leak) => u
             .iter()
             .map(|&u| {
                 if u.abs() < leak * size {
@@ -183,16 +183,16 @@ fn inverted(effect: &Concealed, r: &Recording, state: &State, rig: &RigFile, zer
                 }
             })
             .collect(),
-        Law::Clip(power) => {
+        HiddenLaw::Clip(power) => {
             // The drive makes u of u′: u = u′ / (1 + |u′/L|^p)^(1/p), which stays below L.
             let limit = effect.strongest * (1.0 + 1.0 / size);
             u.iter().map(|u| u / (1.0 - (u.abs() / limit).powf(*power)).powf(1.0 / power)).collect()
         }
-        Law::Delay => {
+        HiddenLaw::Delay => {
             let rows = size.round() as usize;
             (0..n).map(|i| u[(i + rows).min(n - 1)]).collect()
         }
-        Law::Lag => {
+        HiddenLaw::Lag => {
             // The current passes half way between two rows where they meet.
             let between = |i: usize| 0.5 * (u[i.saturating_sub(1)] + u[i.min(n - 1)]);
             let step = |i: usize| {
@@ -206,7 +206,7 @@ fn inverted(effect: &Concealed, r: &Recording, state: &State, rig: &RigFile, zer
                 })
                 .collect()
         }
-        Law::Heating { seconds, by_current } => heated(u, state, size, *seconds, *by_current),
+        HiddenLaw::Heating { seconds, by_current } => heated(u, state, size, *seconds, *by_current),
         _ => u.clone(),
     }
 }
@@ -229,11 +229,11 @@ fn heated(u: &[f64], state: &State, size: f64, seconds: f64, by_current: bool) -
 /// Error of reading at the rows, rad or m.
 fn reading(effect: &Concealed, state: &State, rig: &RigFile, zero: f64, rng: &mut Rng) -> Vec<f64> {
     match &effect.law {
-        Law::Eccentric => {
+        HiddenLaw::Eccentric => {
             let at = |q: f64| effect.size * (q + zero).sin();
             state.place.iter().map(|q| at(*q) - at(state.place[0])).collect()
         }
-        Law::LostCounts { rate, above } => {
+        HiddenLaw::LostCounts { rate, above } => {
             let mut lost = 0.0;
             (0..state.time.len())
                 .map(|i| {

@@ -5,7 +5,7 @@
 
 use super::conceal::{Changed, Concealed, conceal};
 use super::rig_file::RigFile;
-use super::shapes::{Along, Law, Wave};
+use super::shapes::{Along, HiddenLaw, Wave};
 use super::sight::State;
 use crate::dynamics::recording::Recording;
 use crate::generator::drive::{Drive, Segment, Tones};
@@ -99,12 +99,12 @@ struct Checked {
 }
 
 /// Conceals the law in a recording of the plain plant and drives `other`, which has it.
-fn check(law: Law, size: f64, fast: f64, other: &dyn Fn(&mut Plant)) -> Checked {
+fn check(law: HiddenLaw, size: f64, fast: f64, other: &dyn Fn(&mut Plant)) -> Checked {
     check_with(law, size, fast, &|plant, _| other(plant))
 }
 
 /// The same, for a plant that depends on the recorded motion.
-fn check_with(law: Law, size: f64, fast: f64, other: &dyn Fn(&mut Plant, &State)) -> Checked {
+fn check_with(law: HiddenLaw, size: f64, fast: f64, other: &dyn Fn(&mut Plant, &State)) -> Checked {
     let commands: Vec<f64> = (0..ROWS)
         .map(|i| {
             // At rest until a kick that no friction withstands: what a delay takes is nothing, and
@@ -150,15 +150,15 @@ fn assert_exact(name: &str, c: &Checked, part: f64) {
 
 #[test]
 fn forces_are_concealed_as_a_plant_with_them_moves() {
-    let drag = check(Law::Drag(2.0), 0.4, 4.0, &|p| p.drag = 0.4 / 16.0);
+    let drag = check(HiddenLaw::Drag(2.0), 0.4, 4.0, &|p| p.drag = 0.4 / 16.0);
     assert_exact("drag", &drag, 0.02);
     let wave = Wave { order: 3.0, amplitude: 1.0, phase: 0.3 };
-    let cogging = check(Law::Cogging(vec![wave]), 0.08, 4.0, &|p| {
+    let cogging = check(HiddenLaw::Cogging(vec![wave]), 0.08, 4.0, &|p| {
         p.cogging = vec![Harmonic { order: 3.0, amplitude: 0.08 * 2_f64.sqrt(), phase: 0.3 }];
     });
     assert_exact("cogging", &cogging, 0.05);
     let law = StribeckLaw::Exponential(1.5);
-    let stribeck = check(Law::Stribeck { speed: 0.8, power: 1.5 }, 0.15, 4.0, &|p| {
+    let stribeck = check(HiddenLaw::Stribeck { speed: 0.8, power: 1.5 }, 0.15, 4.0, &|p| {
         p.dry.stribeck = Some(Stribeck { peak: 0.15, speed: 0.8, law });
     });
     assert_exact("stribeck", &stribeck, 0.1);
@@ -166,11 +166,11 @@ fn forces_are_concealed_as_a_plant_with_them_moves() {
 
 #[test]
 fn frictions_are_concealed_as_a_plant_with_them_moves() {
-    let viscous = check(Law::Viscous, 0.1, 4.0, &|p| p.viscous += 0.1 / 4.0);
+    let viscous = check(HiddenLaw::Viscous, 0.1, 4.0, &|p| p.viscous += 0.1 / 4.0);
     assert_exact("viscous", &viscous, 0.02);
-    let dry = check(Law::Coulomb, 0.05, 4.0, &|p| p.dry.coulomb += 0.05);
+    let dry = check(HiddenLaw::Coulomb, 0.05, 4.0, &|p| p.dry.coulomb += 0.05);
     assert_exact("dry", &dry, 0.1);
-    let one_way = check(Law::OneWay(1.0), 0.1, 4.0, &|p| {
+    let one_way = check(HiddenLaw::OneWay(1.0), 0.1, 4.0, &|p| {
         // The same in both directions and an asymmetry that takes it off backward.
         let more = 0.5 * 0.1 / 4.0;
         p.viscous_asymmetry = more / (p.viscous + more);
@@ -179,13 +179,13 @@ fn frictions_are_concealed_as_a_plant_with_them_moves() {
     assert_exact("one way", &one_way, 0.02);
     let ramp = Along { from: -1.0, to: 2.0, smooth: false };
     let shape = Shape::Ramp { from: -1.0, to: 2.0 };
-    let along = check(Law::FrictionAlong(ramp), 0.08, 4.0, &|p| p.dry.profile = Some((0.08, shape)));
+    let along = check(HiddenLaw::FrictionAlong(ramp), 0.08, 4.0, &|p| p.dry.profile = Some((0.08, shape)));
     assert_exact("friction along the travel", &along, 0.1);
-    let damping = check(Law::DampingAlong(ramp), 0.1, 4.0, &|p| {
+    let damping = check(HiddenLaw::DampingAlong(ramp), 0.1, 4.0, &|p| {
         p.damping_profile = Some((0.1 / 4.0, shape));
     });
     assert_exact("damping along the travel", &damping, 0.02);
-    let cold = check(Law::WarmingUp(1.5), 0.08, 4.0, &|p| {
+    let cold = check(HiddenLaw::WarmingUp(1.5), 0.08, 4.0, &|p| {
         let start = p.dry.coulomb + 0.08;
         p.dry.warm = Some(Drift { change: -0.08 / start, time_constant: 1.5, law: DriftLaw::Exponential });
         p.dry.coulomb = start;
@@ -196,37 +196,37 @@ fn frictions_are_concealed_as_a_plant_with_them_moves() {
 #[test]
 fn springs_and_weights_are_concealed_as_a_plant_with_them_moves() {
     let travel = Cell::new(0.0);
-    let spring = check_with(Law::Spring(0.0), 0.1, 4.0, &|p, state| {
+    let spring = check_with(HiddenLaw::Spring(0.0), 0.1, 4.0, &|p, state| {
         travel.set(state.travel());
         p.spring = Some((0.1 / (0.5 * state.travel()), 0.0, 0.0));
     });
     assert!(travel.get() > 0.5, "{} rad of travel", travel.get());
     assert_exact("spring", &spring, 0.02);
-    let weight = check(Law::Imbalance, 0.1, 4.0, &|p| p.imbalance = Some((0.1, 0.0)));
+    let weight = check(HiddenLaw::Imbalance, 0.1, 4.0, &|p| p.imbalance = Some((0.1, 0.0)));
     assert_exact("imbalance", &weight, 0.05);
 }
 
 #[test]
 fn an_eccentric_encoder_is_concealed_as_a_plant_with_one_reads() {
-    let read = check(Law::Eccentric, 0.02, 4.0, &|p| p.eccentricity = Some((0.02, 0.0)));
+    let read = check(HiddenLaw::Eccentric, 0.02, 4.0, &|p| p.eccentricity = Some((0.02, 0.0)));
     assert_exact("eccentric", &read, 0.02);
 }
 
 #[test]
 fn maps_of_the_command_are_inverted_as_a_plant_with_them_moves() {
-    let deadband = check(Law::Deadband(0.0), 0.2, 4.0, &|p| {
+    let deadband = check(HiddenLaw::Deadband(0.0), 0.2, 4.0, &|p| {
         p.deadband = Some(Deadband { half_width: 0.2, kind: DeadbandKind::Offset });
     });
     assert_exact("deadband", &deadband, 0.02);
-    let heating = check(Law::Heating { seconds: 1.0, by_current: false }, 0.2, 4.0, &|p| {
+    let heating = check(HiddenLaw::Heating { seconds: 1.0, by_current: false }, 0.2, 4.0, &|p| {
         p.gain_drift = Some(Drift { change: -0.2, time_constant: 1.0, law: DriftLaw::Exponential });
     });
     assert_exact("heating", &heating, 0.02);
     let wave = Wave { order: 2.0, amplitude: 1.0, phase: 1.0 };
-    let ripple = check(Law::Ripple(vec![wave]), 0.1, 4.0, &|p| {
+    let ripple = check(HiddenLaw::Ripple(vec![wave]), 0.1, 4.0, &|p| {
         p.ripple = vec![Harmonic { order: 2.0, amplitude: 0.1 * 2_f64.sqrt(), phase: 1.0 }];
     });
     assert_exact("ripple", &ripple, 0.05);
-    assert_exact("delay", &check(Law::Delay, 3.0, 4.0, &|p| p.delay = 3.0 * ROW_S), 0.1);
-    assert_exact("lag", &check(Law::Lag, 0.01, 4.0, &|p| p.lag = 0.01), 0.1);
+    assert_exact("delay", &check(HiddenLaw::Delay, 3.0, 4.0, &|p| p.delay = 3.0 * ROW_S), 0.1);
+    assert_exact("lag", &check(HiddenLaw::Lag, 0.01, 4.0, &|p| p.lag = 0.01), 0.1);
 }

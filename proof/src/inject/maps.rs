@@ -4,7 +4,7 @@
 
 use super::conceal::{Changed, Concealed, conceal};
 use super::rig_file::RigFile;
-use super::shapes::Law;
+use super::shapes::HiddenLaw;
 use super::sight::State;
 use crate::dynamics::recording::Recording;
 
@@ -25,7 +25,7 @@ fn recording() -> Recording {
     }
 }
 
-fn concealed(law: Law, size: f64) -> (Recording, Changed, f64) {
+fn concealed(law: HiddenLaw, size: f64) -> (Recording, Changed, f64) {
     let original = recording();
     let text = "kind = \"rotary\"\n[model]\ninertia = 0.02\nviscous = 0.05\ncoulomb = 0.1\n[actuator]\ngain = 0.5\n\
         [encoder]\ncounts_per_unit = 1e6\nabsolute = true\n";
@@ -50,7 +50,7 @@ fn assert_mapped(name: &str, (original, changed): (&Recording, &Changed), map: i
 #[test]
 fn a_soft_clip_is_inverted() {
     for (power, size) in [(2.0, 0.8), (4.0, 2.0), (8.0, 5.0)] {
-        let (original, changed, strongest) = concealed(Law::Clip(power), size);
+        let (original, changed, strongest) = concealed(HiddenLaw::Clip(power), size);
         let limit = strongest * (1.0 + 1.0 / size);
         let clipped = |sent: f64| sent / (1.0 + (sent.abs() / limit).powf(power)).powf(1.0 / power);
         assert_mapped("clip", (&original, &changed), clipped);
@@ -60,7 +60,7 @@ fn a_soft_clip_is_inverted() {
 #[test]
 fn a_dead_band_that_leaks_is_inverted() {
     for leak in [0.1, 0.4] {
-        let (original, changed, _) = concealed(Law::Deadband(leak), 0.3);
+        let (original, changed, _) = concealed(HiddenLaw::Deadband(leak), 0.3);
         let passed = |sent: f64| leak * sent + (1.0 - leak) * (sent - sent.clamp(-0.3, 0.3));
         assert_mapped("deadband", (&original, &changed), passed);
     }
@@ -71,7 +71,7 @@ fn a_dead_band_that_leaks_is_inverted() {
 #[test]
 fn a_drive_that_heats_with_its_current_is_inverted() {
     let (loss, seconds) = (0.1, 5.0);
-    let (original, changed, _) = concealed(Law::Heating { seconds, by_current: true }, loss);
+    let (original, changed, _) = concealed(HiddenLaw::Heating { seconds, by_current: true }, loss);
     let mean = original.command.iter().map(|u| u * u).sum::<f64>() / ROWS as f64;
     let (mut warmth, mut hottest) = (0.0, 0.0_f64);
     for (u, sent) in original.command.iter().zip(&changed.command) {
@@ -89,7 +89,7 @@ fn a_drive_that_heats_with_its_current_is_inverted() {
 #[test]
 fn counts_are_lost_against_the_motion_as_often_as_drawn() {
     let (burst, rate, above) = (40.0, 2.0, 1.0);
-    let (original, changed, _) = concealed(Law::LostCounts { rate, above }, burst);
+    let (original, changed, _) = concealed(HiddenLaw::LostCounts { rate, above }, burst);
     let lost: Vec<f64> = original.counts.iter().zip(&changed.counts).map(|(a, b)| a - b).collect();
     let speed = |t: f64| 2.8 * (0.7 * t).cos();
     let (mut bursts, mut fast_s) = (0, 0.0);

@@ -33,7 +33,7 @@ impl Along {
 
 /// A law without its size.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Law {
+pub(crate) enum HiddenLaw {
     /// Force on the axis: size in N·m or N unless said.
     Viscous,
     Coulomb,
@@ -121,51 +121,48 @@ pub(crate) const NAMES: [&str; 22] = [
     "missed_counts",
 ];
 
-impl Law {
+impl HiddenLaw {
     pub(crate) fn side(&self) -> Side {
         match self {
-            Law::Ripple(_)
-            | Law::Deadband(_)
-            | Law::Clip(_)
-            | Law::Delay
-            | Law::Lag
-            | Law::Heating { .. } => Side::Command,
-            Law::Eccentric | Law::LostCounts { .. } => Side::Reading,
+            HiddenLaw::Ripple(_)
+            | HiddenLaw::Deadband(_)
+            | HiddenLaw::Clip(_)
+            | HiddenLaw::Delay
+            | HiddenLaw::Lag
+            | HiddenLaw::Heating { .. } => Side::Command,
+            HiddenLaw::Eccentric | HiddenLaw::LostCounts { .. } => Side::Reading,
             _ => Side::Force,
         }
     }
 
     /// True if forces grow in proportion to the size.
     pub(crate) fn is_linear(&self) -> bool {
-        self.side() == Side::Force || *self == Law::Eccentric
+        self.side() == Side::Force || *self == HiddenLaw::Eccentric
     }
 
     /// Smallest and largest size, where it is not in proportion.
     pub(crate) fn bounds(&self, strongest: f64, row_s: f64) -> (f64, f64) {
         match self {
-            Law::Ripple(_) => (1e-4, 0.5),
-            Law::Deadband(_) => (1e-4 * strongest, 0.5 * strongest),
-            Law::Clip(_) => (0.02, 1000.0),
-            Law::Delay => (1.0, 40.0),
-            Law::Lag => (0.2 * row_s, 40.0 * row_s),
-            Law::Heating { .. } => (1e-3, 0.6),
-            Law::LostCounts { .. } => (1.0, 1e6),
+            HiddenLaw::Ripple(_) => (1e-4, 0.5),
+            HiddenLaw::Deadband(_) => (1e-4 * strongest, 0.5 * strongest),
+            HiddenLaw::Clip(_) => (0.02, 1000.0),
+            HiddenLaw::Delay => (1.0, 40.0),
+            HiddenLaw::Lag => (0.2 * row_s, 40.0 * row_s),
+            HiddenLaw::Heating { .. } => (1e-3, 0.6),
+            HiddenLaw::LostCounts { .. } => (1.0, 1e6),
             _ => (0.0, f64::INFINITY),
         }
     }
 }
 
 /// Draws a law of the effect for the carrier; nothing where its recordings cannot hold it.
-pub(crate) fn draw(name: &str, carrier: &Carrier, states: &[State], rng: &mut Rng) -> Option<Law> {
+pub(crate) fn draw(name: &str, carrier: &Carrier, states: &[State], rng: &mut Rng) -> Option<HiddenLaw> {
     let rig = &carrier.rig;
     let fast = states.iter().map(|s| s.fast).fold(0.0, f64::max);
     let travel = states.iter().map(State::travel).fold(f64::INFINITY, f64::min);
     let seconds = states.iter().map(State::seconds).fold(f64::INFINITY, f64::min);
     let turns = rig.turn.map(|turn| travel / turn);
-    let driven = carrier.recordings().all(|r| {
-        let on = r.command.iter().filter(|u| **u != 0.0).count();
-        on * 2 > r.command.len()
-    });
+    let driven = is_driven(carrier);
     let one_place = rig.absolute || rig.start_spread.is_some_and(|s| s < 0.3 * travel);
     let along = |rng: &mut Rng| {
         let places = || states.iter().flat_map(|s| s.place.iter());
@@ -175,46 +172,55 @@ pub(crate) fn draw(name: &str, carrier: &Carrier, states: &[State], rng: &mut Rn
         Along { from, to, smooth: rng.chance(0.5) }
     };
     let law = match name {
-        "viscous_friction" if rig.viscous.is_none() => Law::Viscous,
-        "coulomb_friction" if rig.coulomb.is_none() => Law::Coulomb,
-        "asymmetric_friction" => Law::OneWay(rng.sign()),
+        "viscous_friction" if rig.viscous.is_none() => HiddenLaw::Viscous,
+        "coulomb_friction" if rig.coulomb.is_none() => HiddenLaw::Coulomb,
+        "asymmetric_friction" => HiddenLaw::OneWay(rng.sign()),
         "stribeck_friction" => {
-            Law::Stribeck { speed: fast * rng.log_range(0.03, 0.2), power: rng.range(1.0, 2.0) }
+            HiddenLaw::Stribeck { speed: fast * rng.log_range(0.03, 0.2), power: rng.range(1.0, 2.0) }
         }
         "presliding_friction" if rig.coulomb.is_some() => {
-            Law::Bristles { length: typical_stroke(states) * rng.log_range(0.02, 0.2) }
+            HiddenLaw::Bristles { length: typical_stroke(states) * rng.log_range(0.02, 0.2) }
         }
-        "quadratic_drag" => Law::Drag(rng.range(1.9, 2.1)),
-        "position_dependent_friction" if one_place => Law::FrictionAlong(along(rng)),
-        "position_dependent_damping" if one_place => Law::DampingAlong(along(rng)),
+        "quadratic_drag" => HiddenLaw::Drag(rng.range(1.9, 2.1)),
+        "position_dependent_friction" if one_place => HiddenLaw::FrictionAlong(along(rng)),
+        "position_dependent_damping" if one_place => HiddenLaw::DampingAlong(along(rng)),
         "load_dependent_friction" if carrier.recordings().all(|r| r.force.iter().any(|f| *f != 0.0)) => {
-            Law::Load
+            HiddenLaw::Load
         }
-        "friction_drift" if seconds >= 4.0 => Law::WarmingUp(seconds * rng.range(0.12, 0.4)),
-        "cogging" => Law::Cogging(waves(turns?, fast / rig.turn?, carrier, rng)?),
-        "torque_ripple" if driven => Law::Ripple(waves(turns?, fast / rig.turn?, carrier, rng)?),
-        "mass_imbalance" if rig.rotary && turns? > 0.6 => Law::Imbalance,
-        "position_spring" => Law::Spring(if rng.chance(0.5) { 0.0 } else { rng.range(0.1, 0.6) }),
-        "tilt_gravity" if rig.weight.is_none() => {
-            carrier.recordings().all(|r| r.tilt.iter().any(|t| *t != r.tilt[0])).then_some(Law::Weight)?
-        }
+        "friction_drift" if seconds >= 4.0 => HiddenLaw::WarmingUp(seconds * rng.range(0.12, 0.4)),
+        "cogging" => HiddenLaw::Cogging(waves(turns?, fast / rig.turn?, carrier, rng)?),
+        "torque_ripple" if driven => HiddenLaw::Ripple(waves(turns?, fast / rig.turn?, carrier, rng)?),
+        "mass_imbalance" if rig.rotary && turns? > 0.6 => HiddenLaw::Imbalance,
+        "position_spring" => HiddenLaw::Spring(if rng.chance(0.5) { 0.0 } else { rng.range(0.1, 0.6) }),
+        "tilt_gravity" if rig.weight.is_none() => carrier
+            .recordings()
+            .all(|r| r.tilt.iter().any(|t| *t != r.tilt[0]))
+            .then_some(HiddenLaw::Weight)?,
         "command_deadband" if driven => {
-            Law::Deadband(if rng.chance(0.5) { 0.0 } else { rng.range(0.05, 0.3) })
+            HiddenLaw::Deadband(if rng.chance(0.5) { 0.0 } else { rng.range(0.05, 0.3) })
         }
-        "command_saturation" if driven => Law::Clip(rng.range(6.0, 14.0)),
-        "command_delay" if driven => Law::Delay,
-        "electrical_lag" if driven => Law::Lag,
+        "command_saturation" if driven => HiddenLaw::Clip(rng.range(6.0, 14.0)),
+        "command_delay" if driven => HiddenLaw::Delay,
+        "electrical_lag" if driven => HiddenLaw::Lag,
         "gain_drift" if driven && seconds >= 4.0 => {
-            Law::Heating { seconds: seconds * rng.range(0.12, 0.4), by_current: rng.chance(0.5) }
+            HiddenLaw::Heating { seconds: seconds * rng.range(0.12, 0.4), by_current: rng.chance(0.5) }
         }
-        "encoder_eccentricity" if rig.rotary && turns? > 1.0 => Law::Eccentric,
+        "encoder_eccentricity" if rig.rotary && turns? > 1.0 => HiddenLaw::Eccentric,
         "missed_counts" if seconds >= 4.0 => {
             let above = if rng.chance(0.5) { 0.0 } else { fast * rng.range(0.2, 0.5) };
-            Law::LostCounts { rate: rng.range(0.5, 2.0), above }
+            HiddenLaw::LostCounts { rate: rng.range(0.5, 2.0), above }
         }
         _ => return None,
     };
     Some(law)
+}
+
+/// True if most rows of every recording have a command.
+fn is_driven(carrier: &Carrier) -> bool {
+    carrier.recordings().all(|r| {
+        let on = r.command.iter().filter(|u| **u != 0.0).count();
+        on * 2 > r.command.len()
+    })
 }
 
 /// Median travel between two reversals, over all recordings, rad or m.
