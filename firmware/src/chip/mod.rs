@@ -23,9 +23,9 @@ pub(crate) use clock::Source;
 pub(crate) use encoder::init as encoder;
 pub(crate) use lamps::Lamps;
 pub(crate) use monitors::{DriveLines, Line};
-pub(crate) use outputs::{InclinometerPin, Lines, OnChipDac};
+pub(crate) use outputs::{InclinometerPin, Lines, OnChipDac, converters};
 pub(crate) use pin::{Pin, Placed};
-pub(crate) use start::{Begun, Own, Parts, Statics, Wired};
+pub(crate) use start::{Begun, Own, Parts, Statics, Wired, own};
 pub(crate) use supply::Supply;
 
 use control_core::ceilings::Ceilings;
@@ -46,7 +46,7 @@ pub(crate) trait Wiring: 'static {
     /// The tilt sensors that may be there.
     type Tilt: TiltSource;
 
-    /// A peripheral that this board does not use.
+    /// The force and the speed that no configuration of this image exceeds.
     const CEILINGS: Ceilings;
     /// The enable line past its owner.
     const ENABLE: Pin = <Self::Enable as Placed>::PIN;

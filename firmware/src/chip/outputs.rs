@@ -72,6 +72,26 @@ impl Lines {
     }
 }
 
+/// Both converters at zero torque, from the peripherals and the ports that have their pins: PA4
+/// leaves no choice, and PE8–PE15 are the same on every board.
+macro_rules! converters {
+    ($device:ident, $gpioa:ident, $gpioe:ident, $rcc:ident) => {{
+        let lines = $crate::chip::Lines::new((
+            $gpioe.pe8,
+            $gpioe.pe9,
+            $gpioe.pe10,
+            $gpioe.pe11,
+            $gpioe.pe12,
+            $gpioe.pe13,
+            $gpioe.pe14,
+            $gpioe.pe15,
+        ));
+        let wide = $crate::chip::OnChipDac::new($device.DAC.constrain($gpioa.pa4.into_analog(), $rcc));
+        firmware::drive::Two { wide, narrow: firmware::drive::ParallelDac(lines) }
+    }};
+}
+pub(crate) use converters;
+
 /// Mid-scale on them, after a crash: the highest bit set, the others cleared.
 pub(super) fn lines_to_zero_torque() {
     const ZERO_TORQUE: u32 = 1 << 15 | 0x7F << (8 + 16);

@@ -68,6 +68,23 @@ pub(crate) struct Own {
     pub(crate) debug: pac::DBGMCU,
 }
 
+/// [`Own`] of the peripherals and of the port that has the pins of USB.
+macro_rules! own {
+    ($device:ident, $gpioa:ident) => {
+        $crate::chip::Own {
+            flash: $device.FLASH,
+            power: $device.PWR,
+            external: $device.EXTI,
+            usb: ($device.OTG_FS_GLOBAL, $device.OTG_FS_DEVICE, $device.OTG_FS_PWRCLK),
+            usb_pins: ($gpioa.pa11, $gpioa.pa12),
+            tick_timer: $device.TIM4,
+            watchdog: $device.IWDG,
+            debug: $device.DBGMCU,
+        }
+    };
+}
+pub(crate) use own;
+
 /// The pins as the board has set them up.
 pub(crate) struct Wired<W: Wiring> {
     pub(crate) encoder: (Encoder, EncoderLines),

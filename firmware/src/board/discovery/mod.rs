@@ -19,12 +19,11 @@
 //! | PD12, PD13, PD14 | lamps: green, running; orange, torque is on; red, a fault | LD4, LD3, LD5 on the board |
 
 use crate::chip::{
-    self, Begun, DriveLines, InclinometerPin, Lamps, Line, Lines, OnChipDac, Own, Parts, Source, Statics,
-    Wired, Wiring,
+    self, Begun, DriveLines, InclinometerPin, Lamps, Line, Parts, Source, Statics, Wired, Wiring,
 };
 use control_core::ceilings::Ceilings;
 use embedded_hal_bus::spi::{ExclusiveDevice, NoDelay};
-use firmware::drive::{Drive, ParallelDac, Two};
+use firmware::drive::Drive;
 use firmware::tilt::{Accelerometer, Inclinometer, Reading, TiltSource};
 use firmware::timing;
 use stm32f4xx_hal::gpio::{Analog, Output, PA5, PA6, PA7, PC1, PD7, PE3};
@@ -62,11 +61,7 @@ impl Wiring for Discovery {
         enable.set_low();
         gpiod.pd4.into_push_pull_output().set_low();
         gpioc.pc0.into_push_pull_output().set_high();
-        let lines = Lines::new((
-            gpioe.pe8, gpioe.pe9, gpioe.pe10, gpioe.pe11, gpioe.pe12, gpioe.pe13, gpioe.pe14, gpioe.pe15,
-        ));
-        let dac = OnChipDac::new(device.DAC.constrain(gpioa.pa4.into_analog(), rcc));
-        let drive = Drive::new(Two { wide: dac, narrow: ParallelDac(lines) }, enable);
+        let drive = Drive::new(chip::converters!(device, gpioa, gpioe, rcc), enable);
 
         let strap = gpiob.pb1.into_pull_down_input();
         // Whatever charge the pin had, its pull has taken away by then.
@@ -91,17 +86,8 @@ impl Wiring for Discovery {
         gpiod.pd12.into_push_pull_output().set_high();
         let lamps = Lamps::new(gpiod.pd13, gpiod.pd14);
 
-        let own = Own {
-            flash: device.FLASH,
-            power: device.PWR,
-            external: device.EXTI,
-            usb: (device.OTG_FS_GLOBAL, device.OTG_FS_DEVICE, device.OTG_FS_PWRCLK),
-            usb_pins: (gpioa.pa11, gpioa.pa12),
-            tick_timer: device.TIM4,
-            watchdog: device.IWDG,
-            debug: device.DBGMCU,
-        };
-        Parts::start(begun, core, own, Wired { encoder, drive, drive_lines, tilt, lamps }, statics)
+        let wired = Wired { encoder, drive, drive_lines, tilt, lamps };
+        Parts::start(begun, core, chip::own!(device, gpioa), wired, statics)
     }
 }
 

@@ -19,11 +19,10 @@
 //! | PB0, PB7, PB14 | lamps: green, running; blue, torque is on; red, a fault | LD1, LD2, LD3 on the board |
 
 use crate::chip::{
-    self, Begun, DriveLines, InclinometerPin, Lamps, Line, Lines, OnChipDac, Own, Parts, Source, Statics,
-    Wired, Wiring,
+    self, Begun, DriveLines, InclinometerPin, Lamps, Line, Parts, Source, Statics, Wired, Wiring,
 };
 use control_core::ceilings::Ceilings;
-use firmware::drive::{Drive, ParallelDac, Two};
+use firmware::drive::Drive;
 use firmware::tilt::Inclinometer;
 use stm32f4xx_hal::gpio::{Analog, Output, PC0, PF13};
 use stm32f4xx_hal::pac;
@@ -58,11 +57,7 @@ impl Wiring for NucleoF429zi {
         // The amplifier before anything else: off, then zero torque.
         let mut enable = gpiof.pf13.into_push_pull_output();
         enable.set_low();
-        let lines = Lines::new((
-            gpioe.pe8, gpioe.pe9, gpioe.pe10, gpioe.pe11, gpioe.pe12, gpioe.pe13, gpioe.pe14, gpioe.pe15,
-        ));
-        let dac = OnChipDac::new(device.DAC.constrain(gpioa.pa4.into_analog(), rcc));
-        let drive = Drive::new(Two { wide: dac, narrow: ParallelDac(lines) }, enable);
+        let drive = Drive::new(chip::converters!(device, gpioa, gpioe, rcc), enable);
 
         let tilt = Inclinometer::new(InclinometerPin::new(device.ADC1, gpioc.pc0.into_analog(), rcc));
         let drive_lines = DriveLines::new(
@@ -79,16 +74,7 @@ impl Wiring for NucleoF429zi {
         gpiob.pb0.into_push_pull_output().set_high();
         let lamps = Lamps::new(gpiob.pb7, gpiob.pb14);
 
-        let own = Own {
-            flash: device.FLASH,
-            power: device.PWR,
-            external: device.EXTI,
-            usb: (device.OTG_FS_GLOBAL, device.OTG_FS_DEVICE, device.OTG_FS_PWRCLK),
-            usb_pins: (gpioa.pa11, gpioa.pa12),
-            tick_timer: device.TIM4,
-            watchdog: device.IWDG,
-            debug: device.DBGMCU,
-        };
-        Parts::start(begun, core, own, Wired { encoder, drive, drive_lines, tilt, lamps }, statics)
+        let wired = Wired { encoder, drive, drive_lines, tilt, lamps };
+        Parts::start(begun, core, chip::own!(device, gpioa), wired, statics)
     }
 }
