@@ -63,19 +63,54 @@ pub(super) fn freedom(effect: &Effect) -> usize {
     degree(effect) as usize
 }
 
-/// Largest less smallest of the fitted polynomial over the travel.
+/// Largest less smallest of the fitted polynomial over the travel. Ends that few rows saw may
+/// differ most and say least, so the interval begins at the most that any two places are sure to
+/// differ by; Scheffé's method allows for choosing them after the fit.
 pub(super) fn span(fitted: &Fitted) -> (f64, f64) {
     let degree = freedom(fitted.effect);
-    let c: Vec<f64> = (0..degree).map(|k| fitted.term(k).0).collect();
-    let mut basis = vec![0.0; degree];
-    let values: Vec<f64> = (0..=60)
+    let places: Vec<Vec<f64>> = (0..=60)
         .map(|i| {
+            let mut basis = vec![0.0; degree];
             legendre(-1.0 + f64::from(i) / 30.0, 1.0, &mut basis);
-            c.iter().zip(&basis).map(|(c, b)| c * b).sum()
+            basis
         })
         .collect();
-    let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let low = values.iter().copied().fold(f64::INFINITY, f64::min);
-    let sd = 2.0 * (0..degree).map(|k| fitted.term(k).1.powi(2)).sum::<f64>().sqrt();
-    fitted.scaled((high - low, sd))
+    let values: Vec<f64> = places
+        .iter()
+        .map(|basis| basis.iter().enumerate().map(|(k, b)| fitted.term(k).0 * b).sum())
+        .collect();
+    let reach = 1.96 * widening(degree);
+    let (mut span, mut least) = (0.0_f64, f64::NEG_INFINITY);
+    for (a, at_a) in values.iter().zip(&places) {
+        for (b, at_b) in values.iter().zip(&places).filter(|(b, _)| *b < a) {
+            let between: Vec<f64> = at_a.iter().zip(at_b).map(|(a, b)| a - b).collect();
+            span = span.max(a - b);
+            least = least.max(a - b - reach * fitted.sd_of(&between));
+        }
+    }
+    let sd = if least.is_finite() { (span - least) / 1.96 } else { 0.0 };
+    fitted.scaled((span, sd))
+}
+
+/// The factor by which 95 % of all differences between places of a profile with `degree` values
+/// hold at once, over that of one difference.
+fn widening(degree: usize) -> f64 {
+    let k = degree.max(1) as f64;
+    // The 95 % quantile of chi square by Wilson and Hilferty.
+    let part = 2.0 / (9.0 * k);
+    (k * (1.0 - part + 1.645 * part.sqrt()).powi(3)).sqrt() / 1.96
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_profile_of_many_values_needs_more_to_differ_from_none() {
+        // Quantiles of chi square from a table: 3.841, 9.488 and 21.026.
+        for (degree, quantile) in [(1, 3.841_f64), (4, 9.488), (12, 21.026)] {
+            let wanted = quantile.sqrt() / 1.96;
+            assert!((widening(degree) / wanted - 1.0).abs() < 0.02, "{degree}: {}", widening(degree));
+        }
+    }
 }

@@ -260,7 +260,8 @@ impl Search<'_> {
             let holdout = self.followed(&now.holdout, &white);
             let slow = own.fit_slow(white.model.clone(), &[&now.slow.noise, &white.noise]);
             let judged = gather_evidence(&own, &white, &slow.noise, &holdout);
-            if judged.iter().all(|judged| judged.rejection().is_none()) {
+            let is_there = |place: usize| parameters::absence(&own, &white, place).is_none();
+            if judged.iter().all(|judged| judged.rejection().is_none()) && (0..judged.len()).all(is_there) {
                 let state = SearchState { white, slow, tracks, holdout };
                 return Some(Next { state, generalises: true });
             }

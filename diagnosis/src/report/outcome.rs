@@ -72,7 +72,7 @@ pub(crate) fn sentence(report: &Report, kind: Kind) -> String {
         Verdict::NoMismatch => format!(
             "The simulation is right to within {:.1} % of the force{}",
             percent(fit.patched.holdout),
-            match (against_noise(report), remains::of_noise(report)) {
+            match (times_noise(report, fit.patched.holdout), remains::of_noise(report)) {
                 (Some(times), _) =>
                     format!(", {times}, and no known effect explains a material part of that"),
                 (None, Some(_)) => ", which is the sensor's noise".into(),
@@ -88,13 +88,13 @@ pub(crate) fn sentence(report: &Report, kind: Kind) -> String {
         Verdict::Unexplained => format!(
             "Simulation and recordings differ repeatably by {:.1} % of the force{}, and no effect is sure enough to be named{}",
             percent(fit.refit.holdout),
-            against_noise(report).map_or(String::new(), |times| format!(", {times}")),
+            times_noise(report, fit.refit.holdout).map_or(String::new(), |times| format!(", {times}")),
             report.reason.as_ref().map_or(String::new(), |reason| format!(": {reason}"))
         ),
         Verdict::RandomDisturbance => format!(
             "A disturbance of {:.1} % of the force{} acts on the axis; it does not repeat and depends on nothing that was recorded",
             percent(fit.patched.holdout),
-            against_noise(report).map_or(String::new(), |times| format!(", {times},"))
+            times_noise(report, fit.patched.holdout).map_or(String::new(), |times| format!(", {times},"))
         ),
         Verdict::InsufficientExcitation => format!(
             "These recordings cannot tell: {}",
@@ -109,16 +109,18 @@ fn percent_of_force(report: &Report, force: f64) -> f64 {
     if whole > 0.0 { 100.0 * force / whole } else { 0.0 }
 }
 
-/// Returns the residual against the sensor's noise, where it is more than that: `19 times the
+/// Returns a residual against the sensor's noise, where it is more than that: `19 times the
 /// sensor's noise`.
-fn against_noise(report: &Report) -> Option<String> {
-    let ratio = remains::of_noise(report).filter(|ratio| *ratio >= remains::MORE)?;
-    Some(format!("{} the sensor's noise", remains::times(ratio)))
+fn times_noise(report: &Report, residual: f64) -> Option<String> {
+    let ratio = residual / report.noise_floor;
+    let is_more = ratio.is_finite() && ratio >= remains::MORE;
+    is_more.then(|| format!("{} the sensor's noise", remains::times(ratio)))
 }
 
-/// The same at the end of a sentence that says how an error falls.
+/// The same of what the patched model leaves, at the end of a sentence that says how an error
+/// falls.
 fn still(report: &Report) -> String {
-    against_noise(report).map_or(String::new(), |times| format!(", still {times}"))
+    times_noise(report, report.fit.patched.holdout).map_or(String::new(), |times| format!(", still {times}"))
 }
 
 /// The sentence of a verdict that names effects.

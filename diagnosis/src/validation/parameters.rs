@@ -130,14 +130,22 @@ pub(crate) fn parameters(
     let fit = &candidate.fit;
     let ratio = fit.value(Key::Gain).unwrap_or(1.0);
     let theta = fit.theta(0);
-    let terms = fit.prepared[0]
+    let own: Vec<(usize, f64)> = fit.prepared[0]
         .columns
         .iter()
         .zip(&fit.places[0])
         .zip(&theta)
         .filter(|((column, _), _)| matches!(column.key, Key::Term { effect: e, .. } if e == effect))
-        .map(|((_, place), theta)| (*theta, covariance.at(*place, *place).max(0.0).sqrt()))
+        .map(|((_, place), theta)| (*place, *theta))
         .collect();
+    let sd = |place: usize| covariance.at(place, place).max(0.0).sqrt();
+    let terms = own.iter().map(|(place, theta)| (*theta, sd(*place))).collect();
+    let mut of_terms = Square::zero(own.len());
+    for (i, (a, _)) in own.iter().enumerate() {
+        for (j, (b, _)) in own.iter().enumerate() {
+            of_terms.add(i, j, covariance.at(*a, *b));
+        }
+    }
     let friction = |key: Key, term: NominalTerm| {
         fit.value(key).or_else(|| {
             let is_same = |e: &Effect| e.name.definition().nominal_term() == Some(term);
@@ -151,6 +159,7 @@ pub(crate) fn parameters(
     let fitted = Fitted {
         effect: found,
         terms,
+        covariance: of_terms,
         inertia,
         common,
         ratio,

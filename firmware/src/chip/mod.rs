@@ -46,7 +46,7 @@ pub(crate) trait Wiring: 'static {
     /// The tilt sensors that may be there.
     type Tilt: TiltSource;
 
-    /// The force and the speed that no configuration of this image exceeds.
+    /// The most that this board may ever be configured for.
     const CEILINGS: Ceilings;
     /// The enable line past its owner.
     const ENABLE: Pin = <Self::Enable as Placed>::PIN;

@@ -1,12 +1,15 @@
 //! The description of an effect in a report.
 
 use crate::effects::{Effect, EffectName, Subsystem};
+use crate::numerics::linear::Square;
 
 /// A fitted effect, from which its values are reported.
 pub(crate) struct Fitted<'a> {
     pub(crate) effect: &'a Effect,
     /// Coefficients with their standard deviations, per inertia.
     pub(crate) terms: Vec<(f64, f64)>,
+    /// Covariance of the coefficients.
+    pub(crate) covariance: Square,
     /// Inertia, kg·m² or kg, and the relative standard deviation of its scale.
     pub(crate) inertia: f64,
     pub(crate) common: f64,
@@ -45,6 +48,13 @@ impl Fitted<'_> {
     /// A coefficient with its standard deviation, per inertia; zero where it is missing.
     pub(crate) fn term(&self, k: usize) -> (f64, f64) {
         self.terms.get(k).copied().unwrap_or((0.0, 0.0))
+    }
+
+    /// Standard deviation of a weighted sum of the coefficients, per inertia.
+    pub(crate) fn sd_of(&self, weights: &[f64]) -> f64 {
+        let n = weights.len().min(self.terms.len());
+        let row = |i: usize| (0..n).map(|j| self.covariance.at(i, j) * weights[j]).sum::<f64>();
+        (0..n).map(|i| weights[i] * row(i)).sum::<f64>().max(0.0).sqrt()
     }
 
     /// A force: the coefficient times the inertia, whose scale is known no better than the rig
