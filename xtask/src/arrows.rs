@@ -1,5 +1,6 @@
-//! The arrow check: no files of a crate use each other in a circle, no function is longer than 60
-//! lines, and files are included by `#[path]` where that has a reason only.
+//! The arrow check: no files of a crate use each other in a circle, no function of a crate or of a
+//! script in JavaScript is longer than 60 lines, and files are included by `#[path]` where that has
+//! a reason only.
 //!
 //! A file uses another if its code, tests aside, names something that the other defines. A name
 //! that a module only hands on (`pub use`) belongs to the file that defines it. A module and the
@@ -42,13 +43,14 @@ pub(crate) fn check() -> Result<(), Error> {
         let name = folder.strip_prefix(shell::top()).unwrap_or(&folder).display().to_string();
         high.extend(too_high(&name, floors::floors(&uses)));
         circles.extend(circles_of(&uses).iter().map(|circle| message(&name, circle, &uses)));
-        for (file, text) in krate::sources(&folder.join("src")).map_err(unreadable)? {
-            let one = |long: lengths::Function| {
-                let lengths::Function { name: function, line, lines } = long;
-                format!("{name}/src/{file}:{line}: {function} has {lines} lines: split it")
-            };
-            long.extend(lengths::too_long(&text).into_iter().map(one));
+        for (file, text) in krate::sources(&folder.join("src"), ".rs").map_err(unreadable)? {
+            long.extend(
+                lengths::too_long(&text).iter().map(|one| one.message(&format!("{name}/src/{file}"))),
+            );
         }
+    }
+    for (file, text) in krate::sources(&shell::top(), "js").map_err(unreadable)? {
+        long.extend(lengths::too_long_in_script(&text).iter().map(|one| one.message(&file)));
     }
     let included = included::unlisted(&shell::top()).map_err(unreadable)?;
     circles.iter().chain(&long).chain(&included).chain(&high).for_each(|one| eprintln!("{one}"));

@@ -17,6 +17,7 @@ mod firmware;
 mod flash;
 mod mutants;
 mod python;
+mod real_recordings;
 mod rows;
 mod setup;
 mod shell;

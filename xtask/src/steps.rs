@@ -4,7 +4,9 @@ use crate::boards::{self, Board};
 use crate::setup::{self, Toolchain};
 use crate::shell::{self, Error, cargo};
 use crate::workspace_build::{ANY_RUST, BUILD, built};
-use crate::{answers, arrows, board_test, counts, firmware, mutants, python, site, wasm, words};
+use crate::{
+    answers, arrows, board_test, counts, firmware, mutants, python, real_recordings, site, wasm, words,
+};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -107,11 +109,15 @@ fn doc() -> Result<(), Error> {
 }
 
 fn unit() -> Result<(), Error> {
+    let absent = real_recordings::absent("unit");
+    let mut tests = tests();
     if has_nextest() {
         // Built with what the other steps run, so that they find it.
-        return shell::run(tests().args(["-E", "not package(tests)"]));
+        real_recordings::leave_out(&mut tests, "not package(tests)", &absent);
+    } else {
+        real_recordings::skip(tests.args(["--exclude", "tests", "--"]), &absent);
     }
-    shell::run(tests().args(["--exclude", "tests"]))
+    shell::run(&mut tests)
 }
 
 fn libraries() -> Result<(), Error> {
@@ -125,8 +131,13 @@ fn slow() -> Result<(), Error> {
     }
     let mut tests = tests();
     tests.env("FIRMWARE_ELF", firmware::path(boards::DEFAULT));
-    let ignored: &[&str] = if has_nextest() { &["--run-ignored", "only"] } else { &["--", "--ignored"] };
-    shell::run(tests.args(ignored))
+    let absent = real_recordings::absent("slow");
+    if has_nextest() {
+        real_recordings::leave_out(tests.args(["--run-ignored", "only"]), "all()", &absent);
+    } else {
+        real_recordings::skip(tests.args(["--", "--ignored"]), &absent);
+    }
+    shell::run(&mut tests)
 }
 
 /// The image of every board, and the same warnings for it as for everything else.

@@ -1,6 +1,7 @@
 //! `cargo xtask test`: everything that passes or fails, setup included, each step also by its own
 //! name; and `cargo xtask nightly`, the checks that take longer than the tests may.
 
+use crate::real_recordings;
 use crate::setup;
 use crate::shell::Error;
 use crate::steps::{NIGHTLY, QUICK, STEPS, TestStep};
@@ -83,6 +84,9 @@ impl Summary {
             self.seconds += seconds;
             let verdict = self.verdict(ended, seconds > step.bound_s);
             self.lines.push(format!("{:<9}{seconds:>7.1} s of {:>4.0}  {verdict}", step.name, step.bound_s));
+            for (name, why) in real_recordings::absent(step.name).iter().map(|test| test.not_run()) {
+                self.not_run(&name, &why);
+            }
         }
     }
 
@@ -131,6 +135,19 @@ mod tests {
         assert_eq!(names(&["unit", "fmt"]), Some(vec!["fmt", "unit"]));
         assert_eq!(names(&["units"]), None);
         assert_eq!(names(&[]).map(|all| all.len()), Some(STEPS.len()));
+    }
+
+    #[test]
+    fn tests_without_recordings_are_named_below_their_step() {
+        let mut summary = Summary::default();
+        summary.run(&[&TestStep { name: "unit", shows: "nothing", bound_s: 1.0, run: || Ok(()) }]);
+        summary.run(&[&TestStep { name: "fmt", shows: "nothing", bound_s: 1.0, run: || Ok(()) }]);
+        let absent = real_recordings::absent("unit");
+        assert_eq!(summary.lines.len(), 2 + absent.len());
+        for (test, line) in absent.iter().zip(&summary.lines[1..]) {
+            let (name, why) = test.not_run();
+            assert!(line.starts_with(&name) && line.ends_with(&format!("not run: {why}")), "{line}");
+        }
     }
 
     #[test]

@@ -1,5 +1,6 @@
-//! The diagnosis on recordings of real machines, where they are at hand. They are not part of the
-//! project: where they are absent these tests say so and check nothing.
+//! The diagnosis on recordings of real machines (`docs/recordings.md`), which are not part of the
+//! repository. A test fails where its recordings are absent; `cargo xtask test` leaves it out there
+//! and names it as not run.
 
 use diagnosis::effects::EffectName;
 use diagnosis::recording::Recording;
@@ -7,13 +8,15 @@ use diagnosis::rig::Rig;
 use diagnosis::{Outcome, Request, Verdict, diagnose};
 use std::path::PathBuf;
 
-fn shared(name: &str) -> Option<PathBuf> {
+/// The folder of recordings.
+fn recorded(name: &str) -> PathBuf {
     let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared/recordings").join(name);
-    if path.exists() {
-        return Some(path);
-    }
-    println!("DID NOT RUN: {} is not here", path.display());
-    None
+    assert!(
+        path.is_dir(),
+        "{} is absent; convert the recordings as docs/recordings.md says, or run `cargo xtask test`, which leaves this test out",
+        path.display()
+    );
+    path
 }
 
 fn run(dir: &std::path::Path, fit: &[&str], held: &[&str]) -> Outcome {
@@ -32,8 +35,8 @@ fn held_error(outcome: &Outcome) -> f64 {
 }
 
 #[test]
-fn emps_names_dry_friction_then_direction_or_did_not_run() {
-    let Some(dir) = shared("emps") else { return };
+fn emps_names_dry_friction_then_direction() {
+    let dir = recorded("emps");
     for (fit, held) in [("train.csv", "pulses.csv"), ("pulses.csv", "train.csv")] {
         let outcome = run(&dir, &[fit], &[held]);
         println!("{}", outcome.summary());
@@ -54,8 +57,8 @@ fn emps_names_dry_friction_then_direction_or_did_not_run() {
 /// The ripple of the ball screw is there (it gains hundreds of nats on the held-out recording) but
 /// takes less than 5 % off the force error.
 #[test]
-fn emps_ripple_is_seen_but_not_material_or_did_not_run() {
-    let Some(dir) = shared("emps") else { return };
+fn emps_ripple_is_seen_but_not_material() {
+    let dir = recorded("emps");
     let mut rig = Rig::read(&dir.join("rig.toml")).expect("the rig is usable");
     rig.model.coulomb = Some(20.39);
     rig.uncertainty.coulomb = Some(0.2);
@@ -76,8 +79,8 @@ fn emps_ripple_is_seen_but_not_material_or_did_not_run() {
 
 #[test]
 #[ignore = "nightly: 25 s"]
-fn anticogging_names_cogging_or_did_not_run() {
-    let Some(dir) = shared("anticogging") else { return };
+fn anticogging_names_cogging() {
+    let dir = recorded("anticogging");
     let outcome =
         run(&dir, &["tenth_rev_per_s_a.csv", "tenth_rev_per_s_b.csv"], &["slower_0_03_rev_per_s.csv"]);
     println!("{}", outcome.summary());
@@ -103,8 +106,8 @@ fn anticogging_names_cogging_or_did_not_run() {
 
 #[test]
 #[ignore = "nightly: 20 s"]
-fn a_belt_that_stretches_loses_no_counts_or_did_not_run() {
-    let Some(dir) = shared("machines/cart-B") else { return };
+fn a_belt_that_stretches_loses_no_counts() {
+    let dir = recorded("machines/cart-B");
     let all = |kind: &str| -> Vec<String> {
         let entries = std::fs::read_dir(&dir).expect("the folder is readable");
         let names =

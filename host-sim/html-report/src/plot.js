@@ -15,18 +15,31 @@ const ticks = (low, high) => {
 const digits = (span) => Math.max(0, Math.min(9, 3 - Math.floor(Math.log10(span))));
 const show = (value, span) => span < 1e-4 || span >= 1e6 ? value.toExponential(3) : value.toFixed(digits(span));
 
-document.querySelectorAll("svg[data-x]").forEach((svg, number) => {
-  const [left, right, top, bottom] = svg.dataset.box.split(" ").map(Number);
-  const range = (text) => text.split(" ").map(Number);
-  const [x0, x1] = range(svg.dataset.x), [y0, y1] = range(svg.dataset.y);
-  const toX = (px) => x0 + (px - left) / (right - left) * (x1 - x0);
-  const toY = (py) => y1 - (py - top) / (bottom - top) * (y1 - y0);
-  /** The stretch that is shown, as places of the whole plot. */
-  let [from, to] = [left, right];
-  /** The place in the whole plot that is shown at `px`. */
-  const whole = (px) => from + (px - left) / (right - left) * (to - from);
-  const [name, unit = ""] = svg.dataset.of.split(", ");
+/** Numbers between blanks. */
+const numbers = (text) => text.split(" ").map(Number);
 
+/** The places of a plot in its picture, the ranges of its axes, and the stretch that is shown, as places of the whole plot. */
+const scaleOf = (svg) => {
+  const [left, right, top, bottom] = numbers(svg.dataset.box);
+  const [x0, x1] = numbers(svg.dataset.x), [y0, y1] = numbers(svg.dataset.y);
+  const scale = { left, right, top, bottom, from: left, to: right, ySpan: y1 - y0 };
+  scale.toX = (px) => x0 + (px - left) / (right - left) * (x1 - x0);
+  scale.toY = (py) => y1 - (py - top) / (bottom - top) * (y1 - y0);
+  scale.xSpan = () => scale.toX(scale.to) - scale.toX(scale.from);
+  scale.isWhole = () => scale.from === left && scale.to === right;
+  /** The place in the whole plot that is shown at `px`. */
+  scale.whole = (px) => scale.from + (px - left) / (right - left) * (scale.to - scale.from);
+  /** The place in the picture of the pointer. */
+  scale.within = (event) => {
+    const box = svg.getBoundingClientRect();
+    return (event.clientX - box.left) / box.width * svg.viewBox.baseVal.width;
+  };
+  scale.inside = (px) => Math.min(right, Math.max(left, px));
+  return scale;
+};
+
+/** Puts the curves into a frame that cuts off what is beside the plot. Returns them, the ticks along the whole, and a place for those of a stretch. */
+const framed = (svg, scale, number) => {
   const { y, height } = svg.viewBox.baseVal;
   const marks = [...svg.children].filter((child) => !child.matches("title, text, .grid"));
   const along = [...svg.children].filter((child) => child.matches("text:not([text-anchor=end]), .grid")
@@ -34,93 +47,126 @@ document.querySelectorAll("svg[data-x]").forEach((svg, number) => {
   const last = [...svg.querySelectorAll("text")].at(-1);
   if (last && !along.includes(last)) along.push(last);
   const clip = create("clipPath", { id: `plot-${number}` });
-  clip.append(create("rect", { x: left, y, width: right - left, height }));
+  clip.append(create("rect", { x: scale.left, y, width: scale.right - scale.left, height }));
   const frame = create("g", { "clip-path": `url(#plot-${number})` });
-  const curvesOf = create("g", {});
+  const curves = create("g", {});
   const zoomed = create("g", {});
-  curvesOf.append(...marks);
-  frame.append(curvesOf);
+  curves.append(...marks);
+  frame.append(curves);
   svg.append(clip, frame, zoomed);
+  return { curves, along, zoomed, labelY: y + height - 8 };
+};
 
-  /** Shows a stretch of the plot, with ticks of its own. */
-  const zoom = (a, b) => {
-    [from, to] = [a, b];
-    const by = (right - left) / (to - from);
-    curvesOf.setAttribute("transform", `translate(${left - from * by} 0) scale(${by} 1)`);
-    const isWhole = from === left && to === right;
-    for (const tick of along) tick.style.display = isWhole ? "" : "none";
-    zoomed.replaceChildren(...isWhole ? [] : ticks(toX(from), toX(to)).flatMap((value) => {
-      const px = left + (value - toX(from)) / (toX(to) - toX(from)) * (right - left);
-      const label = create("text", { x: px, y: y + height - 8, "text-anchor": px > right - 18 ? "end" : "middle" });
-      label.textContent = show(value, toX(to) - toX(from));
-      return [create("line", { class: "grid", x1: px, x2: px, y1: bottom + 1, y2: bottom + 6 }), label];
-    }));
-  };
-
-  let curves = null;
-  const read = () => [...svg.querySelectorAll("path[data-name]")].map((path) => ({
-    name: path.dataset.name,
-    // "M x y" and "L x y" are points; "M x y V y" is the range of a stretch.
-    points: path.getAttribute("d").split(/(?=[ML])/).filter(Boolean)
-      .map((part) => part.slice(1).split(/[ V]/).map(Number)),
+/** Shows a stretch of the plot, with ticks of its own. */
+const zoom = (scale, { curves, along, zoomed, labelY }, [from, to]) => {
+  const { left, right, bottom, toX } = scale;
+  Object.assign(scale, { from, to });
+  const by = (right - left) / (to - from);
+  curves.setAttribute("transform", `translate(${left - from * by} 0) scale(${by} 1)`);
+  const isWhole = scale.isWhole();
+  for (const tick of along) tick.style.display = isWhole ? "" : "none";
+  zoomed.replaceChildren(...isWhole ? [] : ticks(toX(from), toX(to)).flatMap((value) => {
+    const px = left + (value - toX(from)) / scale.xSpan() * (right - left);
+    const label = create("text", { x: px, y: labelY, "text-anchor": px > right - 18 ? "end" : "middle" });
+    label.textContent = show(value, scale.xSpan());
+    return [create("line", { class: "grid", x1: px, x2: px, y1: bottom + 1, y2: bottom + 6 }), label];
   }));
+};
+
+/** The curves of a plot with their points. */
+const curvesOf = (svg) => [...svg.querySelectorAll("path[data-name]")].map((path) => ({
+  name: path.dataset.name,
+  // "M x y" and "L x y" are points; "M x y V y" is the range of a stretch.
+  points: path.getAttribute("d").split(/(?=[ML])/).filter(Boolean)
+    .map((part) => part.slice(1).split(/[ V]/).map(Number)),
+}));
+
+/** The values of the curves at a place of the whole plot, each in words; none of a curve with a gap there. */
+const valuesAt = (curves, px, { left, right, toY, ySpan }) => curves.flatMap(({ name, points }) => {
+  if (!points.length) return [];
+  const near = points.reduce((a, b) => Math.abs(b[0] - px) < Math.abs(a[0] - px) ? b : a);
+  // There is a gap if the nearest point is farther away than the points are apart.
+  if (Math.abs(near[0] - px) > Math.max(8, (right - left) / points.length)) return [];
+  return [`${name} ${near.slice(1).map((py) => show(toY(py), ySpan)).join(" to ")}`];
+});
+
+/** The line at the pointer, and below the plot the values there. */
+const cursorOf = (svg, scale) => {
+  const [name, unit = ""] = svg.dataset.of.split(", ");
   const line = create("line", { class: "cursor" });
-  const chosen = create("rect", { class: "chosen", y: top, height: bottom - top });
   const readout = document.createElement("output");
   svg.after(readout);
-  const within = (event) => {
-    const box = svg.getBoundingClientRect();
-    return (event.clientX - box.left) / box.width * svg.viewBox.baseVal.width;
-  };
-  let begun = null;
-  const at = (event) => {
-    curves ??= read();
-    const shown = within(event);
-    if (begun !== null) {
-      const [a, b] = [begun, Math.min(right, Math.max(left, shown))].sort((one, other) => one - other);
-      chosen.setAttribute("x", a);
-      chosen.setAttribute("width", b - a);
-      svg.append(chosen);
-    }
-    if (shown < left || shown > right) return gone();
-    const px = whole(shown);
-    for (const [key, value] of [["x1", shown], ["x2", shown], ["y1", top], ["y2", bottom]]) line.setAttribute(key, value);
-    svg.append(line);
-    const values = curves.flatMap(({ name: curve, points }) => {
-      if (!points.length) return [];
-      const near = points.reduce((a, b) => Math.abs(b[0] - px) < Math.abs(a[0] - px) ? b : a);
-      // There is a gap if the nearest point is farther away than the points are apart.
-      if (Math.abs(near[0] - px) > Math.max(8, (right - left) / points.length)) return [];
-      return [`${curve} ${near.slice(1).map((py) => show(toY(py), y1 - y0)).join(" to ")}`];
-    });
-    readout.textContent = [`${name} ${show(toX(px), toX(to) - toX(from))} ${unit}`, ...values].join(" · ");
-  };
-  const gone = () => {
+  let curves = null;
+  const hide = () => {
     line.remove();
-    readout.textContent = from === left && to === right ? "" : "double-click for the whole";
+    readout.textContent = scale.isWhole() ? "" : "double-click for the whole";
   };
-  const end = (event) => {
-    if (begun === null) return;
-    const [a, b] = [begun, Math.min(right, Math.max(left, within(event)))].sort((one, other) => one - other);
+  const moveTo = (shown) => {
+    curves ??= curvesOf(svg);
+    if (shown < scale.left || shown > scale.right) return hide();
+    const px = scale.whole(shown);
+    for (const [key, value] of [["x1", shown], ["x2", shown], ["y1", scale.top], ["y2", scale.bottom]]) line.setAttribute(key, value);
+    svg.append(line);
+    readout.textContent = [`${name} ${show(scale.toX(px), scale.xSpan())} ${unit}`, ...valuesAt(curves, px, scale)].join(" · ");
+  };
+  return { moveTo, hide };
+};
+
+/** The stretch that is being dragged over; `choose` is called with it at the end. */
+const dragOf = (svg, scale, choose) => {
+  const chosen = create("rect", { class: "chosen", y: scale.top, height: scale.bottom - scale.top });
+  let begun = null;
+  const ends = (px) => [begun, scale.inside(px)].sort((one, other) => one - other);
+  const cancel = () => {
     begun = null;
     chosen.remove();
+  };
+  const begin = (px) => { begun = px; };
+  const moveTo = (px) => {
+    if (begun === null) return;
+    const [a, b] = ends(px);
+    chosen.setAttribute("x", a);
+    chosen.setAttribute("width", b - a);
+    svg.append(chosen);
+  };
+  const end = (px) => {
+    if (begun === null) return;
+    const [a, b] = ends(px);
+    cancel();
     // A click does not select a stretch, and no stretch is smaller than the numbers resolve.
-    if (b - a > 6 && (b - a) * (to - from) > 1e-3 * (right - left) ** 2) zoom(whole(a), whole(b));
+    const isStretch = b - a > 6 && (b - a) * (scale.to - scale.from) > 1e-3 * (scale.right - scale.left) ** 2;
+    if (isStretch) choose([scale.whole(a), scale.whole(b)]);
+  };
+  return { begin, moveTo, end, cancel };
+};
+
+/** Says in the title what the pointer does. */
+const explain = (svg) => {
+  const hint = create("title", {});
+  hint.textContent = `${svg.querySelector("title")?.textContent ?? ""}: drag over a stretch to see it alone, double-click for the whole`;
+  svg.querySelector("title")?.replaceWith(hint);
+};
+
+document.querySelectorAll("svg[data-x]").forEach((svg, number) => {
+  const scale = scaleOf(svg), parts = framed(svg, scale, number), cursor = cursorOf(svg, scale);
+  const drag = dragOf(svg, scale, (stretch) => zoom(scale, parts, stretch));
+  const at = (event) => {
+    const px = scale.within(event);
+    drag.moveTo(px);
+    cursor.moveTo(px);
   };
   svg.addEventListener("pointermove", at);
   svg.addEventListener("pointerdown", (event) => {
-    const px = within(event);
-    if (px >= left && px <= right) {
-      begun = px;
+    const px = scale.within(event);
+    if (px >= scale.left && px <= scale.right) {
+      drag.begin(px);
       svg.setPointerCapture(event.pointerId);
     }
     at(event);
   });
-  svg.addEventListener("pointerup", end);
-  svg.addEventListener("pointercancel", () => { begun = null; chosen.remove(); });
-  svg.addEventListener("pointerleave", gone);
-  svg.addEventListener("dblclick", () => zoom(left, right));
-  const hint = create("title", {});
-  hint.textContent = `${svg.querySelector("title")?.textContent ?? ""}: drag over a stretch to see it alone, double-click for the whole`;
-  svg.querySelector("title")?.replaceWith(hint);
+  svg.addEventListener("pointerup", (event) => drag.end(scale.within(event)));
+  svg.addEventListener("pointercancel", drag.cancel);
+  svg.addEventListener("pointerleave", cursor.hide);
+  svg.addEventListener("dblclick", () => zoom(scale, parts, [scale.left, scale.right]));
+  explain(svg);
 });

@@ -29,7 +29,7 @@ const IMAGE: &str =
 /// that is gone.
 pub(super) fn unlisted(top: &Path) -> io::Result<Vec<String>> {
     let mut found = Vec::new();
-    for (file, text) in krate::sources(top)? {
+    for (file, text) in krate::sources(top, ".rs")? {
         found.extend(paths(&text).into_iter().map(|path| (file.clone(), path.to_owned())));
     }
     let is =

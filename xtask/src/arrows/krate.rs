@@ -23,7 +23,7 @@ struct Module {
 
 impl Crate {
     pub(super) fn read(folder: &Path) -> io::Result<Self> {
-        let files = sources(folder)?;
+        let files = sources(folder, ".rs")?;
         Ok(Self::of(files.iter().map(|(name, text)| (name.clone(), text.as_str()))))
     }
 
@@ -120,15 +120,16 @@ impl Crate {
     }
 }
 
-/// Every source below a folder, with its path.
-pub(super) fn sources(folder: &Path) -> io::Result<Vec<(String, String)>> {
+/// Every source below a folder whose name ends with `end`, with its path.
+pub(super) fn sources(folder: &Path, end: &str) -> io::Result<Vec<(String, String)>> {
     let mut files = Vec::new();
-    visit(folder, "", &mut files)?;
+    visit(folder, ("", end), &mut files)?;
     Ok(files)
 }
 
-/// Appends every source below a folder, whose path below `src` is `path`.
-fn visit(folder: &Path, path: &str, files: &mut Vec<(String, String)>) -> io::Result<()> {
+/// Appends every source below a folder, whose path below the first one is `path`, if its name ends
+/// with `end`.
+fn visit(folder: &Path, (path, end): (&str, &str), files: &mut Vec<(String, String)>) -> io::Result<()> {
     let mut entries = fs::read_dir(folder)?.collect::<io::Result<Vec<_>>>()?;
     entries.sort_by_key(fs::DirEntry::file_name);
     for entry in entries {
@@ -139,8 +140,8 @@ fn visit(folder: &Path, path: &str, files: &mut Vec<(String, String)>) -> io::Re
             if SKIPPED.contains(&name) {
                 continue;
             }
-            visit(&entry.path(), &below, files)?;
-        } else if name.ends_with(".rs") {
+            visit(&entry.path(), (&below, end), files)?;
+        } else if name.ends_with(end) {
             files.push((below, fs::read_to_string(entry.path())?));
         }
     }

@@ -4,100 +4,31 @@
 
 pub mod angle;
 pub mod coefficients;
+mod outcome;
 pub mod residual_force;
 pub mod step;
+mod trials;
+mod turns;
 pub mod weight;
 
 use crate::bench::{Act, Bench, Line};
-use crate::servo::servo;
 use coefficients::Found;
-use control_core::compensation::Gain;
 use control_core::controller::Sample;
-use control_core::excitation::{Excitation, Signal};
-use control_core::units::{Millimetres, MillimetresPerSecond, MillinewtonMetres};
+use control_core::excitation::Excitation;
+use control_core::units::MillinewtonMetres;
 use control_core::{Device, Patient, Plan};
 use device_sim::error::Error;
 use diagnosis::rig::Rig;
 use fixed::types::I16F16;
-use link::commissioning::Record;
-use residual_force::ResidualForce;
-use std::f64::consts::TAU;
+pub use outcome::CompensationOutcome;
 use std::time::Duration;
 pub use step::{CompensationStep, Part};
+use trials::{Trials, unless_felt_more};
+use turns::{excitations, play, played, seconds};
 
-/// Speed of the slow turns, mm/s: a slow insertion.
-const SPEED_MM_S: f64 = 10.0;
-/// Turns of the roller each way.
-const TURNS: f64 = 1.05;
-/// The time for which the roller is held.
-const HOLD_MS: u32 = 6_000;
 /// The time that a person has to tilt the device, and the tilt of the virtual hand, rad.
 const TILTING: Duration = Duration::from_secs(4);
 const DOWN_RAD: f64 = 0.5;
-
-/// A tilt that differs by less says too little of a weight, rad.
-const LEAST_TILT_RAD: f64 = 0.15;
-/// A phase counts as worse where it is felt by more than this beyond what it was: so far two runs
-/// of the same device differ.
-const REPEATS_N: f64 = 2e-3;
-const REPEATS_SHARE: f64 = 0.05;
-
-/// The result.
-#[derive(Clone, Debug)]
-pub struct CompensationOutcome {
-    /// The device's part, as the device has it now, under its seal.
-    pub record: Record,
-    /// The rotor's angle, if any part depends on it.
-    pub angle: Option<angle::Angle>,
-    /// The force of the mechanism that a hand would feel without compensation.
-    pub before: ResidualForce,
-    /// The force that it felt before, with what the device fed forward; none where it fed nothing
-    /// forward.
-    pub as_it_was: Option<ResidualForce>,
-    /// The force that it feels with what the device feeds forward now.
-    pub after: ResidualForce,
-    /// The weight that was measured because the report had none, in mN·m.
-    pub weight_mnm: Option<f64>,
-    /// The findings that cannot be fed forward, a sentence each.
-    pub left_out: Vec<String>,
-    /// The parts that were tried and undone because the hand would have felt more than before, a
-    /// sentence each.
-    pub taken_back: Vec<String>,
-    /// False where everything was taken back: the device is configured as it was before.
-    pub is_compensated: bool,
-    /// The motion that all of it took, s.
-    pub motion_s: f64,
-}
-
-impl CompensationOutcome {
-    /// Returns the result, one line each.
-    pub fn lines(&self) -> Vec<String> {
-        let mut lines: Vec<String> =
-            self.weight_mnm.iter().map(|weight| format!("weight measured={weight:.3} mN·m")).collect();
-        lines.extend(self.taken_back.iter().chain(&self.left_out).cloned());
-        let (before, after) = (&self.before, &self.after);
-        let rows = [
-            ("insertion", before.insertion, after.insertion),
-            ("hold", before.hold, after.hold),
-            ("withdrawal", before.withdrawal, after.withdrawal),
-            ("all", before.all(), after.all()),
-        ];
-        lines.extend(rows.map(|(what, before, after)| {
-            format!("{what} before={:.1} after={:.1} mN rms", before * 1e3, after * 1e3)
-        }));
-        lines
-    }
-
-    /// Returns the reason why nothing is fed forward, where everything was taken back.
-    pub fn refusal(&self) -> Option<Error> {
-        (!self.is_compensated).then(|| {
-            Error::failed(format_args!(
-                "the device is as it was before: {}; characterise and diagnose again",
-                self.taken_back.join("; ")
-            ))
-        })
-    }
-}
 
 /// The wishes of whoever compensates.
 #[derive(Clone, Copy, Debug)]
@@ -162,12 +93,6 @@ struct Work<'a, 'b, A> {
     is_changed: bool,
 }
 
-/// A device as it was tried, and what a hand would feel of it.
-struct Trial {
-    device: Device,
-    residual: ResidualForce,
-}
-
 impl<A: AsyncFnMut(CompensationStep) -> Result<(), Error>> Work<'_, '_, A> {
     async fn run(&mut self) -> Result<CompensationOutcome, Error> {
         let radius = self.before.roller_radius.0.to_num::<f64>();
@@ -188,9 +113,15 @@ impl<A: AsyncFnMut(CompensationStep) -> Result<(), Error>> Work<'_, '_, A> {
         } else {
             None
         };
-        let device = self.before;
-        let as_it_was = if was_fed { Some(self.residual_with(&device).await?) } else { None };
-        let (kept, mut taken_back) = self.keep_what_helps(&full, &before, angle).await?;
+        let mut trials = Trials {
+            bench: self.bench,
+            ask: self.ask,
+            inertia: self.found.inertia,
+            motion_s: self.wish.motion_s,
+            is_changed: &mut self.is_changed,
+        };
+        let as_it_was = if was_fed { Some(trials.residual_with(&self.before).await?) } else { None };
+        let (kept, mut taken_back) = trials.keep_what_helps(&full, &before, angle).await?;
         let kept = unless_felt_more(kept, as_it_was.as_ref(), &mut taken_back);
         let is_compensated = kept.is_some();
         if !is_compensated {
@@ -254,126 +185,6 @@ impl<A: AsyncFnMut(CompensationStep) -> Result<(), Error>> Work<'_, '_, A> {
             }
         }
     }
-
-    /// Tries all that was found, and takes parts back, the most harmful first, until no phase is
-    /// felt more than before. None where nothing is left.
-    async fn keep_what_helps(
-        &mut self,
-        full: &Device,
-        before: &ResidualForce,
-        angle: Option<angle::Angle>,
-    ) -> Result<(Option<Trial>, Vec<String>), Error> {
-        let (turns, hold) = excitations(self.found.inertia, full.roller_radius.0.to_num(), true);
-        let trial_s = seconds(&turns) + seconds(&hold);
-        let mut taken_back = Vec::new();
-        let mut kept = self.try_it(full, angle, CompensationStep::After).await?;
-        while excess(before, &kept.residual) > 0.0 {
-            let mut best: Option<(Part, Trial)> = None;
-            let fed = |device: &Device| Part::ALL.map(|part| (part, part.is_fed(&device.compensation)));
-            let parts: Vec<Part> =
-                fed(&kept.device).into_iter().filter(|(_, is_fed)| *is_fed).map(|(part, _)| part).collect();
-            // Without its last part it is the device as it was.
-            for part in parts.iter().copied().filter(|_| parts.len() > 1) {
-                if self.bench.played_s() + trial_s > self.wish.motion_s {
-                    taken_back.push("the motion allowed does not suffice to try without each part".into());
-                    break;
-                }
-                let mut device = kept.device;
-                *part.gain(&mut device.compensation.gains) = Gain(0);
-                let trial = self.try_it(&device, angle, CompensationStep::Without(part)).await?;
-                let order = |residual: &ResidualForce| (excess(before, residual), residual.all());
-                if best.as_ref().is_none_or(|(_, other)| order(&trial.residual) < order(&other.residual)) {
-                    best = Some((part, trial));
-                }
-            }
-            let Some((part, trial)) = best else {
-                taken_back.extend(parts.into_iter().map(|part| said(part, before, &kept.residual)));
-                return Ok((None, taken_back));
-            };
-            taken_back.push(said(part, before, &kept.residual));
-            kept = trial;
-        }
-        if kept.residual.all() >= before.all() {
-            taken_back.push(format!(
-                "all of it was taken back: with it the hand felt {:.1} mN rms, {:.1} before",
-                kept.residual.all() * 1e3,
-                before.all() * 1e3
-            ));
-            return Ok((None, taken_back));
-        }
-        // The last one tried need not be the one that is kept.
-        self.configure(&kept.device, angle).await?;
-        Ok((Some(kept), taken_back))
-    }
-
-    async fn try_it(
-        &mut self,
-        device: &Device,
-        angle: Option<angle::Angle>,
-        step: CompensationStep,
-    ) -> Result<Trial, Error> {
-        (self.ask)(step).await?;
-        self.bench.settle().await?;
-        self.configure(device, angle).await?;
-        let residual = self.residual_with(device).await?;
-        Ok(Trial { device: *device, residual })
-    }
-
-    /// Plays the turns and the hold with what `device`, as which it is configured, feeds forward.
-    async fn residual_with(&mut self, device: &Device) -> Result<ResidualForce, Error> {
-        let radius = device.roller_radius.0.to_num::<f64>();
-        let (turns, hold) = excitations(self.found.inertia, radius, true);
-        let fed = play(self.bench, &turns, &hold).await?;
-        residual_force::measure(&plan(device)?, (&turns, &fed.0), (&hold, &fed.1))
-    }
-
-    async fn configure(&mut self, device: &Device, angle: Option<angle::Angle>) -> Result<(), Error> {
-        self.is_changed = true;
-        self.bench.configure(device).await?;
-        match angle {
-            Some(angle) => self.bench.index(angle.count).await,
-            None => Ok(()),
-        }
-    }
-}
-
-/// A trial, unless the hand felt less with what the device fed forward before.
-fn unless_felt_more(
-    trial: Option<Trial>,
-    as_it_was: Option<&ResidualForce>,
-    taken_back: &mut Vec<String>,
-) -> Option<Trial> {
-    let (Some(residual), Some(was)) = (trial.as_ref().map(|trial| trial.residual.all()), as_it_was) else {
-        return trial;
-    };
-    if residual < was.all() {
-        return trial;
-    }
-    taken_back.push(format!(
-        "all of it was taken back: with it the hand felt {:.1} mN rms, and {:.1} with what the device fed forward before",
-        residual * 1e3,
-        was.all() * 1e3
-    ));
-    None
-}
-
-/// By how much the phases that are felt more than before are so, beyond what two runs differ, in N.
-fn excess(before: &ResidualForce, after: &ResidualForce) -> f64 {
-    let phases = before.phases().into_iter().zip(after.phases());
-    phases.map(|((_, was), (_, is))| (is - was - f64::max(REPEATS_N, REPEATS_SHARE * was)).max(0.0)).sum()
-}
-
-/// Returns the reason why a part was undone, in a sentence.
-fn said(part: Part, before: &ResidualForce, after: &ResidualForce) -> String {
-    let phases = before.phases().into_iter().zip(after.phases());
-    let worst = phases.max_by(|a, b| (a.1.1 - a.0.1).total_cmp(&(b.1.1 - b.0.1)));
-    worst.map_or_else(String::new, |((name, was), (_, is))| {
-        format!(
-            "{part} was taken back: with it the {name} was felt with {:.0} mN rms, {:.0} before",
-            is * 1e3,
-            was * 1e3
-        )
-    })
 }
 
 /// Finds the rotor's angle again on a device that was compensated and then restarted.
@@ -396,44 +207,4 @@ fn find_angle(device: &Device, found: &Found, samples: &[Sample]) -> Result<angl
     let scale =
         (f64::from(device.counts_per_turn), per_code, f64::from(device.dac.mid_scale()), found.inertia);
     angle::find(samples, &found.waves, scale)
-}
-
-/// The slow turns and the hold.
-fn excitations(inertia: f64, radius_mm: f64, compensated: bool) -> (Excitation, Excitation) {
-    let stroke = TURNS * TAU * radius_mm;
-    let excitation = |signal, duration_ms| Excitation {
-        signal,
-        duration_ms,
-        servo: servo(inertia, radius_mm),
-        travel: Millimetres(I16F16::from_num(2.0 * stroke)),
-        compensated,
-    };
-    let signal = Signal::Triangle {
-        stroke: Millimetres(I16F16::from_num(stroke)),
-        speed: MillimetresPerSecond(I16F16::from_num(SPEED_MM_S)),
-    };
-    (excitation(signal, (2.0 * stroke / SPEED_MM_S * 1e3) as u32), excitation(Signal::Hold, HOLD_MS))
-}
-
-fn seconds(excitation: &Excitation) -> f64 {
-    f64::from(excitation.duration_ms) * 1e-3
-}
-
-async fn play(
-    bench: &mut Bench<'_>,
-    turns: &Excitation,
-    hold: &Excitation,
-) -> Result<(Vec<Sample>, Vec<Sample>), Error> {
-    Ok((played(bench, turns).await?, played(bench, hold).await?))
-}
-
-async fn played(bench: &mut Bench<'_>, excitation: &Excitation) -> Result<Vec<Sample>, Error> {
-    bench.settle().await?;
-    let longest = Duration::from_millis(u64::from(excitation.duration_ms) + 5_000);
-    match bench.play_within(excitation, longest).await? {
-        (samples, None) => Ok(samples),
-        (_, Some(fault)) => Err(Error::failed(format_args!(
-            "{fault}; see that nothing holds the roller and compensate again"
-        ))),
-    }
 }

@@ -2,10 +2,12 @@
 //! fro, once level and once tilted, differs in its mean torque by the weight alone. Friction acts
 //! in both directions and waves go round, so that neither shows in the mean. Pure calculation.
 
-use super::{LEAST_TILT_RAD, TURNS};
+use super::turns::TURNS;
 use control_core::controller::Sample;
 use control_core::{Device, TICK_HZ};
 
+/// A tilt that differs by less says too little of a weight, rad.
+const LEAST_TILT_RAD: f64 = 0.15;
 /// Torque fades in within this, ticks.
 const FADED: usize = TICK_HZ as usize / 2;
 

@@ -12,6 +12,7 @@ mod patched;
 mod play;
 mod settled;
 mod subject;
+mod undesigned;
 
 pub use feel::Feel;
 pub use name::Name;
