@@ -64,8 +64,8 @@ pub(super) fn freedom(effect: &Effect) -> usize {
 }
 
 /// Largest less smallest of the fitted polynomial over the travel. Ends that few rows saw may
-/// differ most and say least, so the interval begins at the most that any two places are sure to
-/// differ by; Scheffé's method allows for choosing them after the fit.
+/// differ most and say least, so the interval begins at the largest lower limit of a difference
+/// between two places; Scheffé's method allows for choosing them after the fit.
 pub(super) fn span(fitted: &Fitted) -> (f64, f64) {
     let degree = freedom(fitted.effect);
     let places: Vec<Vec<f64>> = (0..=60)

@@ -117,18 +117,11 @@ pub(crate) fn absence(context: &FitContext, fitted: &FittedModel, effect: usize)
     (!is_there).then_some(Rejection::NoSize)
 }
 
-/// The parameters of an effect of a fitted model.
-pub(crate) fn parameters(
-    context: &FitContext,
-    candidate: &FittedModel,
-    effect: usize,
-) -> BTreeMap<String, Parameter> {
-    let nominal = context.nominal;
-    let found: &Effect = &candidate.model.effects[effect];
-    let (inertia, _, common) = scale(nominal, candidate);
-    let covariance = robust_covariance(candidate);
+/// The coefficients of an effect of a fitted model with their standard deviations, and their
+/// covariance.
+fn own_terms(candidate: &FittedModel, effect: usize) -> (Vec<(f64, f64)>, Square) {
     let fit = &candidate.fit;
-    let ratio = fit.value(Key::Gain).unwrap_or(1.0);
+    let covariance = robust_covariance(candidate);
     let theta = fit.theta(0);
     let own: Vec<(usize, f64)> = fit.prepared[0]
         .columns
@@ -138,14 +131,28 @@ pub(crate) fn parameters(
         .filter(|((column, _), _)| matches!(column.key, Key::Term { effect: e, .. } if e == effect))
         .map(|((_, place), theta)| (*place, *theta))
         .collect();
-    let sd = |place: usize| covariance.at(place, place).max(0.0).sqrt();
-    let terms = own.iter().map(|(place, theta)| (*theta, sd(*place))).collect();
     let mut of_terms = Square::zero(own.len());
     for (i, (a, _)) in own.iter().enumerate() {
         for (j, (b, _)) in own.iter().enumerate() {
             of_terms.add(i, j, covariance.at(*a, *b));
         }
     }
+    let sd = |place: usize| covariance.at(place, place).max(0.0).sqrt();
+    (own.iter().map(|(place, theta)| (*theta, sd(*place))).collect(), of_terms)
+}
+
+/// The parameters of an effect of a fitted model.
+pub(crate) fn parameters(
+    context: &FitContext,
+    candidate: &FittedModel,
+    effect: usize,
+) -> BTreeMap<String, Parameter> {
+    let nominal = context.nominal;
+    let found: &Effect = &candidate.model.effects[effect];
+    let (inertia, _, common) = scale(nominal, candidate);
+    let fit = &candidate.fit;
+    let ratio = fit.value(Key::Gain).unwrap_or(1.0);
+    let (terms, of_terms) = own_terms(candidate, effect);
     let friction = |key: Key, term: NominalTerm| {
         fit.value(key).or_else(|| {
             let is_same = |e: &Effect| e.name.definition().nominal_term() == Some(term);
