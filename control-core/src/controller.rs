@@ -276,8 +276,9 @@ impl Core {
         }
         let mut transitions = self.insertion.tick(&self.plan.anatomy, depth);
         let response = {
-            let (law, plan) = (&self.plan.config.patient.law, &self.plan.law);
-            self.memory.tick(law, plan, &self.insertion, Motion { depth, speed, movement: &self.movement })
+            let (law, prepared) = (&self.plan.config.patient.law, &self.plan.law);
+            let motion = Motion { depth, speed, movement: &self.movement };
+            self.memory.tick(law, prepared, &self.insertion, motion)
         };
         transitions.barrier = response.barrier;
         if response.open | self.insertion.opened() != 0 {

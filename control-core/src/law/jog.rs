@@ -99,7 +99,7 @@ impl PreparedJog {
             let _ = rubs.push(Rub { per_mm, above: I8F24::saturating_from_num(rub_above) });
         }
         let walls = wall::all(limits.layers.iter().map(|met| &met.layer));
-        Ok(Self { walls_that_close: walls.len().min(1), walls, rubs, friction: plan_friction(friction) })
+        Ok(Self { walls_that_close: walls.len().min(1), walls, rubs, friction: prepare_friction(friction) })
     }
 }
 
@@ -229,7 +229,7 @@ fn check_friction(law: &FrictionLaw, limits: &ForceLimits) -> Result<(), Refusal
     }
 }
 
-fn plan_friction(law: &FrictionLaw) -> PreparedFriction {
+fn prepare_friction(law: &FrictionLaw) -> PreparedFriction {
     match *law {
         FrictionLaw::Paper { level_length, level_cap, anchor_ms, stiffness, limit, limit_out } => {
             PreparedFriction::Paper {

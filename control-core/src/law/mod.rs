@@ -1,7 +1,7 @@
 //! The laws of force: what the needle feels of the anatomy that it has met. Each is a file with
-//! what a person configures, what of it may run (`Plan`), what the tick remembers (`Memory`) and
-//! the tick itself; a fourth is one more file and one more line at the end of this one. A law knows
-//! no device: [`ForceLimits`] says what it may ask for.
+//! what a person configures, what the tick reads of it (`PreparedJog` and so on), what the tick
+//! remembers (`Memory`) and the tick itself; a fourth is one more file and one more line at the end
+//! of this one. A law knows no device: [`ForceLimits`] says what it may ask for.
 
 use crate::anatomy::Insertion;
 use crate::event::State;
@@ -104,7 +104,7 @@ macro_rules! laws {
 
         /// The law that is in force, checked and ready for the tick.
         #[derive(Clone, Debug)]
-        #[allow(clippy::large_enum_variant, reason = "nothing allocates here, and a device has one plan")]
+        #[allow(clippy::large_enum_variant, reason = "nothing allocates here, and a device has one")]
         pub(crate) enum PreparedLaw { $($name($module::$prepared)),+ }
 
         /// Its memory.
@@ -128,7 +128,7 @@ macro_rules! laws {
             /// A bit for each layer that gives way by this law rather than by a wall of its own.
             pub(crate) fn ruptures(&self) -> u8 {
                 match self {
-                    PreparedLaw::Xr(plan) => plan.ruptures(),
+                    PreparedLaw::Xr(prepared) => prepared.ruptures(),
                     PreparedLaw::Jog(_) | PreparedLaw::Sparte(_) => 0,
                 }
             }
@@ -148,20 +148,20 @@ macro_rules! laws {
                 }
             }
 
-            /// One tick of `law`, of which `plan` was made, with a needle that moves so, where
-            /// `met` says what it has met.
+            /// One tick of `law`, from which `prepared` was made, with a needle that moves so and
+            /// has met what `met` says.
             pub(crate) fn tick(
                 &mut self,
                 law: &Law,
-                plan: &PreparedLaw,
+                prepared: &PreparedLaw,
                 met: &Insertion,
                 motion: Motion,
             ) -> Response {
-                match (self, plan, law) {
-                    $((Memory::$name(memory), PreparedLaw::$name(plan), Law::$name(config)) => {
-                        memory.tick(config, plan, met, motion)
+                match (self, prepared, law) {
+                    $((Memory::$name(memory), PreparedLaw::$name(prepared), Law::$name(config)) => {
+                        memory.tick(config, prepared, met, motion)
                     })+
-                    // A memory is made by its plan, and a plan by its law.
+                    // A memory is made by its prepared law, and that by its law.
                     _ => Response::NONE,
                 }
             }

@@ -174,15 +174,15 @@ impl Memory {
     pub(crate) fn tick(
         &mut self,
         config: &Sparte,
-        plan: &PreparedSparte,
+        prepared: &PreparedSparte,
         met: &Insertion,
         Motion { depth, speed, movement }: Motion,
     ) -> Response {
         let step =
             depth.0.to_bits().wrapping_sub(self.last_depth.0.to_bits()).clamp(-LARGEST_STEP, LARGEST_STEP);
         self.last_depth = depth;
-        let pressed = pressed(plan, met, depth);
-        if met.given() < plan.walls_that_close || depth.0 < met.top(0) {
+        let pressed = pressed(prepared, met, depth);
+        if met.given() < prepared.walls_that_close || depth.0 < met.top(0) {
             self.wall.release(depth);
             self.bristles = I8F24::ZERO;
             self.entry = None;
@@ -193,15 +193,15 @@ impl Memory {
             return Response { force, state, ..Response::NONE };
         }
         let elastic = pressed.unwrap_or_default();
-        let cut = plan.cuts.get(met.innermost(depth)).copied().unwrap_or_default();
+        let cut = prepared.cuts.get(met.innermost(depth)).copied().unwrap_or_default();
         if met.given() > self.given {
             let left = truncating_product(cut.inwards.0.to_bits(), config.after_puncture.to_bits(), 16);
             let left = Newtons(I16F16::from_bits(left));
-            self.wall.release(Millimetres(depth.0.saturating_sub(reach(left.0, plan.inverse_tracking))));
+            self.wall.release(Millimetres(depth.0.saturating_sub(reach(left.0, prepared.inverse_tracking))));
         }
         self.given = met.given();
-        let (cutting, is_full) = self.track(config, plan, cut, elastic, (depth, movement.has_stopped()));
-        let friction = self.rub(&plan.rub, step, speed);
+        let (cutting, is_full) = self.track(config, prepared, cut, elastic, (depth, movement.has_stopped()));
+        let friction = self.rub(&prepared.rub, step, speed);
         let (lateral, barrier) = self.hold_direction(&config.fixture, met.angle());
         let state = if movement.direction() == Direction::Out {
             State::Withdrawal
@@ -221,19 +221,20 @@ impl Memory {
     fn track(
         &mut self,
         config: &Sparte,
-        plan: &PreparedSparte,
+        prepared: &PreparedSparte,
         cut: Cutting,
         elastic: I16F16,
         (depth, has_stopped): (Millimetres, bool),
     ) -> (I16F16, bool) {
-        let inwards = reach(cut.inwards.0.saturating_sub(elastic).max(I16F16::ZERO), plan.inverse_tracking);
+        let inwards =
+            reach(cut.inwards.0.saturating_sub(elastic).max(I16F16::ZERO), prepared.inverse_tracking);
         let is_full = self.wall.stretch(depth) >= inwards;
-        self.wall.drag(depth, inwards, reach(cut.outwards.0, plan.inverse_tracking));
+        self.wall.drag(depth, inwards, reach(cut.outwards.0, prepared.inverse_tracking));
         let stretch = self.wall.stretch(depth);
-        let held = reach(plan.rub.sliding, plan.inverse_tracking);
+        let held = reach(prepared.rub.sliding, prepared.inverse_tracking);
         if has_stopped && stretch.unsigned_abs() > held.unsigned_abs() {
             let held = if stretch < I16F16::ZERO { -held } else { held };
-            self.wall.follow(depth.0.saturating_sub(held), plan.relax);
+            self.wall.follow(depth.0.saturating_sub(held), prepared.relax);
         }
         let force = saturating_multiply(self.wall.stretch(depth), config.tracking.0);
         (force, is_full)
@@ -286,8 +287,8 @@ impl Rub {
 }
 
 /// The polynomial of the wall that is pushed in, where one is.
-fn pressed(plan: &PreparedSparte, met: &Insertion, depth: Millimetres) -> Option<I16F16> {
-    let wall = plan.walls.get(met.given()).filter(|_| met.presses())?;
+fn pressed(prepared: &PreparedSparte, met: &Insertion, depth: Millimetres) -> Option<I16F16> {
+    let wall = prepared.walls.get(met.given()).filter(|_| met.presses())?;
     let travel = met.travel(met.given(), depth);
     (travel >= I16F16::ZERO).then(|| wall.elastic_force(travel).0)
 }

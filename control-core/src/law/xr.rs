@@ -141,7 +141,7 @@ impl PreparedTable {
         let cells = table.cells();
         let knots = table.forces.len() / cells.max(1);
         let in_each = table.depths.len() > knots;
-        let mut plan = Self {
+        let mut prepared = Self {
             hull: hull(&table.forces, cells),
             knots,
             depth_row: if in_each { cells } else { 1 },
@@ -155,15 +155,15 @@ impl PreparedTable {
         };
         for &knot in &table.gives_way {
             let knot = usize::from(knot);
-            let shallowest = (0..cells).map(|cell| plan.depth(table, knot, cell)).min().unwrap_or(0);
+            let shallowest = (0..cells).map(|cell| prepared.depth(table, knot, cell)).min().unwrap_or(0);
             let above =
                 |depth: Millimetres| i64::from(depth.0.to_bits()) * 100 <= i64::from(shallowest) << 16;
             let met = limits.layers.iter().rposition(|met| above(met.layer.depth)).unwrap_or(0);
             let number = limits.layers.get(met).map_or(0, |met| met.number);
             // There is room for as many as the table may have.
-            let _ = plan.ruptures.push(Rupture { knot, met, layer: 1_u8.unbounded_shl(number.into()) });
+            let _ = prepared.ruptures.push(Rupture { knot, met, layer: 1_u8.unbounded_shl(number.into()) });
         }
-        Ok(plan)
+        Ok(prepared)
     }
 
     /// A bit for each layer that gives way.
@@ -226,13 +226,13 @@ struct Track {
 impl Track {
     /// Follows a tip that is `at` a knot, Q16, and `along` the needle past the skin. A bit for the
     /// layer that gives way now.
-    fn follow(&mut self, plan: &PreparedTable, at: u32, along: I16F16, angle: Milliradians) -> u8 {
+    fn follow(&mut self, prepared: &PreparedTable, at: u32, along: I16F16, angle: Milliradians) -> u8 {
         let off = i64::from((i32::from(angle.0) - i32::from(self.angle.0)).abs());
         if self.given > 0 && off * i64::from(along.to_bits()) > BESIDE {
-            self.leave(plan, at, angle);
+            self.leave(prepared, at, angle);
         }
         let mut ruptured = 0;
-        if let Some(next) = plan.ruptures.get(self.given)
+        if let Some(next) = prepared.ruptures.get(self.given)
             && at >= (next.knot as u32) << 16
         {
             if self.given == 0 {
@@ -242,7 +242,7 @@ impl Track {
             ruptured = next.layer & !self.open;
             self.open |= next.layer;
         }
-        if let Some(last) = self.given.checked_sub(1).and_then(|last| plan.ruptures.get(last)) {
+        if let Some(last) = self.given.checked_sub(1).and_then(|last| prepared.ruptures.get(last)) {
             // In the fall the track reaches as far as the tip has been.
             self.front = self.front.max(at.min((last.knot as u32 + 1) << 16));
         }
@@ -251,11 +251,11 @@ impl Track {
 
     /// The tip is beside the track: what lies deeper is whole.
     #[inline(never)]
-    fn leave(&mut self, plan: &PreparedTable, at: u32, angle: Milliradians) {
+    fn leave(&mut self, prepared: &PreparedTable, at: u32, angle: Milliradians) {
         self.front = self.front.min(at);
         let is_above = |rupture: &&Rupture| (rupture.knot as u32) << 16 <= at;
-        self.given = plan.ruptures.iter().take(self.given).take_while(is_above).count();
-        self.open = plan.ruptures.iter().take(self.given).fold(0, |open, rupture| open | rupture.layer);
+        self.given = prepared.ruptures.iter().take(self.given).take_while(is_above).count();
+        self.open = prepared.ruptures.iter().take(self.given).fold(0, |open, rupture| open | rupture.layer);
         self.angle = angle;
     }
 }
@@ -283,13 +283,13 @@ impl Memory {
     pub(crate) fn tick(
         &mut self,
         table: &ForceTable,
-        plan: &PreparedTable,
+        prepared: &PreparedTable,
         met: &Insertion,
         Motion { depth, speed, movement }: Motion,
     ) -> Response {
-        let (fine, steady) = self.way.tick(depth, speed, plan.count);
+        let (fine, steady) = self.way.tick(depth, speed, prepared.count);
         let fine = Millimetres(fine.0.saturating_sub(self.surface.tick()));
-        self.cells.follow(table, &plan.gaps, steady, met.angle());
+        self.cells.follow(table, &prepared.gaps, steady, met.angle());
         if depth.0 < met.top(0) {
             self.anchor.release(fine);
             if depth.0 < met.top(0).saturating_sub(ANOTHER_ENTRY) {
@@ -299,23 +299,28 @@ impl Memory {
         }
         let along = fine.0.saturating_sub(met.top(0)).max(I16F16::ZERO);
         let inside = truncating_product(along.to_bits(), met.depth_per_path().to_bits(), 30);
-        let position = plan.position(table, &self.cells, self.knot, I16F16::from_bits(inside));
+        let position = prepared.position(table, &self.cells, self.knot, I16F16::from_bits(inside));
         self.knot = position.knot;
-        let ruptured = self.track.follow(plan, position.q16(), along, met.angle());
+        let ruptured = self.track.follow(prepared, position.q16(), along, met.angle());
         let is_in_track = position.q16() < self.track.front;
-        let most = plan.force(if is_in_track { &plan.hull } else { &table.forces }, &self.cells, position);
-        let has_opened = plan.ruptures.is_empty() || self.track.given > 0;
-        let is_inside = met.given() >= plan.walls_that_close && has_opened;
+        let most =
+            prepared.force(if is_in_track { &prepared.hull } else { &table.forces }, &self.cells, position);
+        let has_opened = prepared.ruptures.is_empty() || self.track.given > 0;
+        let is_inside = met.given() >= prepared.walls_that_close && has_opened;
         // A wall that has not given way pushes back and does not hold.
         let share = if is_inside { table.withdrawal } else { I16F16::ZERO };
         let least = I16F16::from_bits(truncating_product(most.to_bits(), share.to_bits(), 16));
-        self.anchor.drag(fine, reach(most, plan.inverse_stiffness), reach(least, plan.inverse_stiffness));
+        self.anchor.drag(
+            fine,
+            reach(most, prepared.inverse_stiffness),
+            reach(least, prepared.inverse_stiffness),
+        );
         let force = saturating_multiply(self.anchor.stretch(fine), table.stiffness.0);
         let state = if is_inside && movement.direction() == Direction::Out {
             State::Withdrawal
-        } else if !is_in_track && self.falls(plan, position) {
+        } else if !is_in_track && self.falls(prepared, position) {
             State::Puncture
-        } else if met.presses() || self.presses(plan, met, depth) {
+        } else if met.presses() || self.presses(prepared, met, depth) {
             State::Elastic
         } else if is_inside {
             State::Friction
@@ -332,14 +337,14 @@ impl Memory {
     }
 
     /// True if the tip is where the layer that gave way last falls.
-    fn falls(&self, plan: &PreparedTable, position: Position) -> bool {
-        let last = self.track.given.checked_sub(1).and_then(|last| plan.ruptures.get(last));
+    fn falls(&self, prepared: &PreparedTable, position: Position) -> bool {
+        let last = self.track.given.checked_sub(1).and_then(|last| prepared.ruptures.get(last));
         last.is_some_and(|last| last.knot == position.knot)
     }
 
     /// True if the tip pushes in the layer that gives way next.
-    fn presses(&self, plan: &PreparedTable, met: &Insertion, depth: Millimetres) -> bool {
-        plan.ruptures.get(self.track.given).is_some_and(|next| depth.0 >= met.top(next.met))
+    fn presses(&self, prepared: &PreparedTable, met: &Insertion, depth: Millimetres) -> bool {
+        prepared.ruptures.get(self.track.given).is_some_and(|next| depth.0 >= met.top(next.met))
     }
 }
 

@@ -3,6 +3,7 @@
 mod anatomy;
 mod compensation;
 mod excitations;
+mod faults;
 mod laws;
 mod needle;
 mod orders;

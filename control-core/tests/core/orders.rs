@@ -1,5 +1,6 @@
 //! Every order in every mode, and every bound at the last value within it and the first beyond.
 
+use crate::needle::Needle;
 use control_core::config::DacWidth;
 use control_core::event::{Fault, Limits, State};
 use control_core::excitation::{Excitation, Servo, Signal};
@@ -131,6 +132,18 @@ fn a_plan_taken_deep_inside_finds_a_needle_at_rest() {
     assert_eq!(output.speed.0, I16F16::ZERO, "no jump from zero is taken for speed");
     let met = (0..5).fold(output.transitions.contact, |met, _| met | tick(&mut c, 400).transitions.contact);
     assert_eq!(met, 0b111, "and the layers it is in are counted, one a tick");
+}
+
+#[test]
+fn orders_that_do_not_fit_the_mode_change_nothing() {
+    let mut needle = Needle::new(&Config::commissioned_virtual(), STRAIGHT);
+    needle.go(2.5, 10.0, |_| {});
+    let before = needle.rest(0.1);
+    needle.core.order(Order::Zero);
+    needle.core.order(LargeOrder::Configure(Config::commissioned_virtual().plan().expect("sound")));
+    needle.core.order(Order::Start);
+    let after = needle.rest(0.000_1);
+    assert_eq!((before.sample, before.force), (after.sample, after.force));
 }
 
 #[test]

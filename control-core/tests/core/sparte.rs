@@ -1,5 +1,6 @@
-//! The law of Paper 002 against its floating-point twin, written from the equations, and what a
-//! hand would notice of it.
+//! The law of Paper 002 against its floating-point twin, and what a hand would notice of it.
+
+mod twin;
 
 use crate::needle::{Needle, force};
 use control_core::config::{
@@ -15,6 +16,7 @@ use control_core::units::{
 use control_core::{Config, Refusal, TickOutput};
 use fixed::types::{I8F24, I16F16};
 use proptest::prelude::*;
+use twin::Twin;
 
 /// A needle straight into the skin: lengths along it are depths.
 const STRAIGHT: Milliradians = Milliradians(1_571);
@@ -90,141 +92,6 @@ fn sparte(config: &mut Config) -> &mut Sparte {
     match &mut config.patient.law {
         Law::Sparte(sparte) => sparte,
         other => panic!("{other:?}"),
-    }
-}
-
-/// The twin: force from depth and the core's own speed, whatever happened before.
-struct Twin {
-    sparte: Sparte,
-    walls: Vec<(usize, Wall)>,
-    given: usize,
-    touched: usize,
-    origins: Vec<f64>,
-    tops: Vec<f64>,
-    wall: f64,
-    bristles: f64,
-    last: f64,
-    /// Ticks so far, and whether something happened in the last one: the movement is looked at
-    /// every 16 ticks, in the tenth of them, unless there is more to do.
-    ticks: u32,
-    is_busy: bool,
-    has_stopped: bool,
-    /// Looks since the needle last went on in its direction; the furthest place; in 1, out −1, at
-    /// rest 0.
-    still: u32,
-    furthest: f64,
-    direction: f64,
-}
-
-impl Twin {
-    fn new(config: &Config) -> Self {
-        let Law::Sparte(sparte) = config.patient.law.clone() else { panic!("the twin of sparte") };
-        let layers = &config.patient.layers;
-        let tops: Vec<f64> = layers.iter().map(|l| l.depth.0.to_num()).collect();
-        Self {
-            sparte,
-            walls: layers.iter().enumerate().filter_map(|(i, l)| Some((i, l.wall?))).collect(),
-            given: 0,
-            touched: 0,
-            origins: tops.clone(),
-            tops,
-            wall: 0.0,
-            bristles: 0.0,
-            last: 0.0,
-            // One before the start.
-            ticks: 1,
-            is_busy: false,
-            has_stopped: true,
-            still: 0,
-            furthest: 0.0,
-            direction: 0.0,
-        }
-    }
-
-    /// A quarter of a mm is a new direction, a quarter of a second without going on a rest.
-    fn follow(&mut self, x: f64) {
-        let off = x - self.furthest;
-        self.still += 1;
-        if off * self.direction > 0.0 {
-            (self.furthest, self.still) = (x, 0);
-        } else if off.abs() >= 0.25 {
-            (self.direction, self.furthest, self.still) = (off.signum(), x, 0);
-        } else if self.still == 2_500 / 16 {
-            (self.direction, self.furthest) = (0.0, x);
-        }
-        self.has_stopped = self.direction == 0.0 || self.still > 200 / 16 && off.abs() < 0.1;
-    }
-
-    fn tick(&mut self, out: &TickOutput) -> f64 {
-        let force = self.force(out);
-        self.ticks += 1;
-        let happened = out.transitions.contact | out.transitions.puncture | out.transitions.exit != 0;
-        if self.ticks % 16 == 10 && !self.is_busy && !happened {
-            self.follow(out.depth.0.to_num());
-        }
-        self.is_busy = happened;
-        force
-    }
-
-    fn force(&mut self, out: &TickOutput) -> f64 {
-        let (x, v) = (out.depth.0.to_num::<f64>(), out.speed.0.to_num::<f64>());
-        let step = x - std::mem::replace(&mut self.last, x);
-        let given = self.given;
-        self.given += out.transitions.puncture.count_ones() as usize;
-        if out.transitions.contact != 0 {
-            // Late where the wall above carried it along.
-            let top = self.tops[self.touched];
-            self.origins[self.touched] = if x - top > 0.3 { x } else { top };
-            self.touched += 1;
-        }
-        if out.transitions.exit != 0 {
-            self.touched -= 1;
-            self.given = self.given.min(self.walls.iter().filter(|(layer, _)| *layer < self.touched).count());
-        }
-        let elastic = self.walls.get(self.given).filter(|(layer, _)| *layer < self.touched).map_or(
-            0.0,
-            |(layer, w)| {
-                let travel = x - self.origins[*layer];
-                if travel < 0.0 { 0.0 } else { travel * travel / w.elastic.compliance.0.to_num::<f64>() }
-            },
-        );
-        if self.given == 0 || x < self.tops[0] {
-            (self.wall, self.bristles) = (x, 0.0);
-            return elastic;
-        }
-        let innermost = self.tops[..self.touched].iter().rposition(|&top| x >= top).unwrap_or(0);
-        let cut = self.sparte.cutting[innermost];
-        if self.given > given {
-            let left = cut.inwards.0.to_num::<f64>() * self.sparte.after_puncture.to_num::<f64>();
-            self.wall = x - left / self.sparte.tracking.0.to_num::<f64>();
-        }
-        elastic + self.track(cut, elastic, x) + self.rub(step, v)
-    }
-
-    fn track(&mut self, cut: Cutting, elastic: f64, x: f64) -> f64 {
-        let stiffness = self.sparte.tracking.0.to_num::<f64>();
-        let inwards = (cut.inwards.0.to_num::<f64>() - elastic).max(0.0) / stiffness;
-        let outwards = cut.outwards.0.to_num::<f64>() / stiffness;
-        self.wall = self.wall.max(x - inwards).min(x + outwards);
-        let held = self.sparte.friction.sliding.0.to_num::<f64>() / stiffness;
-        let stretch = x - self.wall;
-        if self.has_stopped && stretch.abs() > held {
-            let share = -(-0.1 / f64::from(self.sparte.relax_ms)).exp_m1();
-            self.wall += (stretch - held * stretch.signum()) * share;
-        }
-        stiffness * (x - self.wall)
-    }
-
-    fn rub(&mut self, step: f64, v: f64) -> f64 {
-        let f = self.sparte.friction;
-        let num = |value: Newtons| value.0.to_num::<f64>();
-        let stiffness = f.stiffness.0.to_num::<f64>();
-        let ratio = (v.abs() / f.speed.0.to_num::<f64>()).min(4.0);
-        let level = num(f.sliding) + (num(f.sticking) - num(f.sliding)) * (-ratio * ratio).exp();
-        self.bristles = (self.bristles + step) / (1.0 + stiffness * step.abs() / level);
-        let held = stiffness * self.bristles;
-        let rate = v - v.abs() * (held / level).clamp(-1.0, 1.0);
-        held + rate * f.damping.0.to_num::<f64>() + v * f.viscous.0.to_num::<f64>()
     }
 }
 

@@ -1,6 +1,8 @@
 //! The force table of Paper 000 against its floating-point twin, and what a hand would notice of
 //! it.
 
+mod twin;
+
 use crate::needle::{Needle, force};
 use control_core::config::{ForceTable, Law, Layer, SpeedMethod, Tissue};
 use control_core::event::{Limits, State};
@@ -176,7 +178,7 @@ proptest! {
         let mut needle = Needle::new(&config, Milliradians(tilt));
         // Until the speed has forgotten that it began somewhere.
         needle.rest(0.8);
-        let mut way = Way::new(needle.core.plan().mm_per_count().to_num());
+        let mut way = twin::Way::new(needle.core.plan().mm_per_count().to_num());
         let mut anchor = -1.0_f64;
         let mut worst = 0.0_f64;
         needle.go(16.0, speed, |out| {
@@ -186,7 +188,7 @@ proptest! {
                 return;
             }
             let mrad = f64::from(out.angle.0);
-            let most = twin(&table, x.max(0.0) * (mrad * 1e-3).sin(), v.abs(), mrad);
+            let most = twin::force(&table, x.max(0.0) * (mrad * 1e-3).sin(), v.abs(), mrad);
             let stiffness = table.stiffness.0.to_num::<f64>();
             anchor = anchor.clamp(x - most / stiffness, x.max(anchor));
             worst = worst.max((force(out) - stiffness * (x - anchor)).abs());
@@ -194,64 +196,6 @@ proptest! {
         // A knot is passed in the tick after it.
         prop_assert!(worst < 3e-3, "{} N", worst);
     }
-}
-
-/// The way between counts and the steady speed, in floating point.
-struct Way {
-    count_mm: f64,
-    depth: f64,
-    part: f64,
-    steady: f64,
-}
-
-impl Way {
-    fn new(count_mm: f64) -> Self {
-        Self { count_mm, depth: 0.0, part: 0.0, steady: 0.0 }
-    }
-
-    fn tick(&mut self, depth: f64, speed: f64) -> (f64, f64) {
-        self.steady += (speed - self.steady) / 512.0;
-        self.part = if depth == self.depth {
-            (self.part + self.steady * 1e-4).clamp(0.0, self.count_mm)
-        } else if depth > self.depth {
-            0.0
-        } else {
-            self.count_mm
-        };
-        self.depth = depth;
-        (depth + self.part - self.count_mm / 2.0, self.steady)
-    }
-}
-
-/// Depth and force of each knot between the cells, then force between the knots.
-fn twin(table: &ForceTable, depth: f64, speed: f64, mrad: f64) -> f64 {
-    let place = |knots: &[f64], at: f64| {
-        let index = knots.iter().rposition(|knot| *knot <= at).unwrap_or(0);
-        let next = (index + 1).min(knots.len() - 1);
-        let gap = knots[next] - knots[index];
-        let share = if gap > 0.0 { ((at - knots[index]) / gap).clamp(0.0, 1.0) } else { 0.0 };
-        [(index, 1.0 - share), (next, share)]
-    };
-    let speeds: Vec<f64> = table.speeds.iter().map(|k| k.0.to_num()).collect();
-    let angles: Vec<f64> = table.angles.iter().map(|k| f64::from(k.0)).collect();
-    let (per_speed, cells) = (angles.len(), speeds.len() * angles.len());
-    let (s, a) = (place(&speeds, speed), place(&angles, mrad));
-    let mix = |value: &dyn Fn(usize) -> f64| {
-        let corners =
-            s.iter().flat_map(|(si, sw)| a.iter().map(move |(ai, aw)| (si * per_speed + ai, sw * aw)));
-        corners.map(|(cell, weight)| weight * value(cell)).sum::<f64>()
-    };
-    let knots = table.forces.len() / cells;
-    let depth_of = |knot: usize, cell: usize| {
-        f64::from(if table.depths.len() == knots {
-            table.depths[knot]
-        } else {
-            table.depths[knot * cells + cell]
-        })
-    };
-    let depths: Vec<f64> = (0..knots).map(|k| mix(&|cell| depth_of(k, cell)) * 0.01).collect();
-    let force = |knot: usize| mix(&|cell| f64::from(table.forces[knot * cells + cell]) * 1e-3);
-    place(&depths, depth).iter().map(|(knot, weight)| weight * force(*knot)).sum()
 }
 
 /// Skin that gives way at 2 mm, a vessel at 4 mm that gives way at 5 mm; each a little deeper the

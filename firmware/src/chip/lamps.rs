@@ -3,19 +3,20 @@
 use firmware::port;
 use stm32f4xx_hal::gpio::{self, AnyPin, Output, PinState};
 
-/// A lamp for torque and one for a fault; a third, which the board lights by itself, says that the
-/// image runs.
+/// A lamp for torque and one for a fault. A third says that the image runs and stays lit.
 pub(crate) struct Lamps {
     powered: AnyPin<Output>,
     fault: AnyPin<Output>,
 }
 
 impl Lamps {
-    /// Dark. Both shine while their pin is high.
-    pub(crate) fn new<const P: char, const N: u8, const Q: char, const M: u8>(
-        powered: gpio::Pin<P, N>,
-        fault: gpio::Pin<Q, M>,
+    /// Lights `running` and leaves the others dark. Each shines while its pin is high.
+    pub(crate) fn new<const P: char, const N: u8, const Q: char, const M: u8, const R: char, const L: u8>(
+        running: gpio::Pin<P, N>,
+        powered: gpio::Pin<Q, M>,
+        fault: gpio::Pin<R, L>,
     ) -> Self {
+        running.into_push_pull_output().set_high();
         Self {
             powered: powered.into_push_pull_output_in_state(PinState::Low).erase(),
             fault: fault.into_push_pull_output_in_state(PinState::Low).erase(),

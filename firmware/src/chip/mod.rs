@@ -23,7 +23,7 @@ pub(crate) use clock::Source;
 pub(crate) use encoder::init as encoder;
 pub(crate) use lamps::Lamps;
 pub(crate) use monitors::{DriveLines, Line};
-pub(crate) use outputs::{InclinometerPin, Lines, OnChipDac, converters};
+pub(crate) use outputs::{InclinometerPin, Lines, OnChipDac, amplifier_off, converters};
 pub(crate) use pin::{Pin, Placed};
 pub(crate) use start::{Begun, Own, Parts, Statics, Wired, own};
 pub(crate) use supply::Supply;

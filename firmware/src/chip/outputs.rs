@@ -9,7 +9,7 @@ use stm32f4xx_hal::adc::Adc;
 use stm32f4xx_hal::adc::config::{AdcConfig, Clock, SampleTime};
 use stm32f4xx_hal::dac::{C1, DacOut};
 use stm32f4xx_hal::gpio::outport::OutPort8;
-use stm32f4xx_hal::gpio::{PE8, PE9, PE10, PE11, PE12, PE13, PE14, PE15};
+use stm32f4xx_hal::gpio::{self, Output, PE8, PE9, PE10, PE11, PE12, PE13, PE14, PE15};
 use stm32f4xx_hal::hal_02::adc::Channel;
 use stm32f4xx_hal::pac::{ADC1, DAC, GPIOE};
 use stm32f4xx_hal::prelude::*;
@@ -70,6 +70,14 @@ impl Lines {
         );
         Self(outputs.outport())
     }
+}
+
+/// The amplifier's enable line as an output that is low. The board calls this before it sets up any
+/// other pin.
+pub(crate) fn amplifier_off<const P: char, const N: u8>(pin: gpio::Pin<P, N>) -> gpio::Pin<P, N, Output> {
+    let mut enable = pin.into_push_pull_output();
+    enable.set_low();
+    enable
 }
 
 /// Both converters at zero torque, from the peripherals and the ports that have their pins: PA4

@@ -57,8 +57,7 @@ impl Wiring for Discovery {
         let gpioe = device.GPIOE.split(rcc);
 
         // The amplifier before anything else: off, then zero torque.
-        let mut enable = gpiod.pd7.into_push_pull_output();
-        enable.set_low();
+        let enable = chip::amplifier_off(gpiod.pd7);
         gpiod.pd4.into_push_pull_output().set_low();
         gpioc.pc0.into_push_pull_output().set_high();
         let drive = Drive::new(chip::converters!(device, gpioa, gpioe, rcc), enable);
@@ -83,8 +82,7 @@ impl Wiring for Discovery {
         // PA15 is the debugger's JTDI out of reset (RM0090 8.3.2); from here on it is the timer's.
         let tracks = (gpioa.pa15.into_pull_up_input(), gpioa.pa1.into_pull_up_input());
         let encoder = chip::encoder(device.TIM2, tracks, gpioe.pe7, rcc);
-        gpiod.pd12.into_push_pull_output().set_high();
-        let lamps = Lamps::new(gpiod.pd13, gpiod.pd14);
+        let lamps = Lamps::new(gpiod.pd12, gpiod.pd13, gpiod.pd14);
 
         let wired = Wired { encoder, drive, drive_lines, tilt, lamps };
         Parts::start(begun, core, chip::own!(device, gpioa), wired, statics)

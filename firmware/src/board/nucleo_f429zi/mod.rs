@@ -55,8 +55,7 @@ impl Wiring for NucleoF429zi {
         let gpiog = device.GPIOG.split(rcc);
 
         // The amplifier before anything else: off, then zero torque.
-        let mut enable = gpiof.pf13.into_push_pull_output();
-        enable.set_low();
+        let enable = chip::amplifier_off(gpiof.pf13);
         let drive = Drive::new(chip::converters!(device, gpioa, gpioe, rcc), enable);
 
         let tilt = Inclinometer::new(InclinometerPin::new(device.ADC1, gpioc.pc0.into_analog(), rcc));
@@ -71,8 +70,7 @@ impl Wiring for NucleoF429zi {
         let tracks = (gpioa.pa15.into_pull_up_input(), gpiob.pb3.into_pull_up_input());
         let encoder = chip::encoder(device.TIM2, tracks, gpioe.pe7, rcc);
         gpiog.pg6.into_push_pull_output().set_low();
-        gpiob.pb0.into_push_pull_output().set_high();
-        let lamps = Lamps::new(gpiob.pb7, gpiob.pb14);
+        let lamps = Lamps::new(gpiob.pb0, gpiob.pb7, gpiob.pb14);
 
         let wired = Wired { encoder, drive, drive_lines, tilt, lamps };
         Parts::start(begun, core, chip::own!(device, gpioa), wired, statics)
