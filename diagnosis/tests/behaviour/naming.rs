@@ -86,6 +86,17 @@ fn a_part_of_a_turn_shows_the_orders_that_fit_twice() {
     assert!(said.contains(&format!("orders 1 to {highest};")), "{said}: {turns} turns");
 }
 
+/// A spring of unknown rest place is a constant force if it has no stiffness: taken for one, it
+/// ended the search before friction that differs with direction was tried.
+#[test]
+fn friction_of_direction_is_not_lost_to_a_spring_without_stiffness() {
+    let machine = Machine { forward: 4.0, backward: 2.0, ..AXIS };
+    let take = |seed| axis::record(machine, BENCH, seed, mixed(20.0, seed as f64));
+    let rig = rig(WHOLE, "start_spread = 0.1", "", BENCH.counts);
+    let outcome = diagnosed(&rig, &[take(1), take(2)], &[take(3)]);
+    assert_eq!(names(&outcome), [N::AsymmetricFriction]);
+}
+
 fn range(values: &[f64]) -> f64 {
     values.iter().copied().fold(f64::MIN, f64::max) - values.iter().copied().fold(f64::MAX, f64::min)
 }
