@@ -90,9 +90,10 @@ fn a_part_of_a_turn_shows_the_orders_that_fit_twice() {
 /// ended the search before friction that differs with direction was tried.
 #[test]
 fn friction_of_direction_is_not_lost_to_a_spring_without_stiffness() {
-    let machine = Machine { forward: 4.0, backward: 2.0, ..AXIS };
-    let take = |seed| axis::record(machine, BENCH, seed, mixed(20.0, seed as f64));
-    let rig = rig(WHOLE, "start_spread = 0.1", "", BENCH.counts);
+    let machine = Machine { forward: 5.0, backward: 1.0, ..AXIS };
+    let coarse = Taken { counts: 300.0, ..BENCH };
+    let take = |seed| axis::record(machine, coarse, seed, mixed(12.0, seed as f64));
+    let rig = rig(WHOLE, "start_spread = 0.1", "", coarse.counts);
     let outcome = diagnosed(&rig, &[take(1), take(2)], &[take(3)]);
     assert_eq!(names(&outcome), [N::AsymmetricFriction]);
 }
