@@ -89,7 +89,7 @@ fn a_part_of_a_turn_shows_the_orders_that_fit_twice() {
 /// A spring of unknown rest place is a constant force if it has no stiffness: taken for one, it
 /// ended the search before friction that differs with direction was tried.
 #[test]
-fn friction_of_direction_is_not_lost_to_a_spring_without_stiffness() {
+fn a_spring_without_stiffness_hides_no_friction_of_direction() {
     let machine = Machine { forward: 5.0, backward: 1.0, ..AXIS };
     let coarse = Taken { counts: 300.0, ..BENCH };
     let take = |seed| axis::record(machine, coarse, seed, mixed(12.0, seed as f64));
