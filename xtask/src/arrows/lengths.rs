@@ -84,6 +84,7 @@ fn length(lines: &[&str]) -> Option<usize> {
     }
     end(lines, signature + 1, |line| line == "}")
 }
+
 /// The number of lines to the first one from `from` on that is as far to the left as the first line
 /// and ends it.
 fn end(lines: &[&str], from: usize, is_end: impl Fn(&str) -> bool) -> Option<usize> {
