@@ -197,6 +197,7 @@ impl SpeedEstimator {
     }
 
     /// One tick: the speed at `count`.
+    #[inline]
     pub(crate) fn tick(&mut self, scale: &Scale, count: Counts) -> MillimetresPerSecond {
         self.now = self.now.wrapping_add(1);
         match self.method {

@@ -16,7 +16,7 @@ impl Core {
     /// is mN·m.
     pub(super) fn wanted_torque(
         &mut self,
-        segments: &mut impl BorrowMut<Segments>,
+        segments: &mut dyn BorrowMut<Segments>,
         mut force: Elements,
         (depth, speed): (Millimetres, MillimetresPerSecond),
         has_given_way: bool,
