@@ -3,7 +3,7 @@
 use super::play::Limited;
 use super::{Asked, Inputs, Settings, Settled};
 use device_sim::error::Error;
-use diagnosis::report::{Report, Verdict};
+use diagnosis::report::{Contending, Report, Verdict};
 use experiment::{Case, design};
 use std::path::Path;
 
@@ -34,16 +34,26 @@ pub(super) fn following(
     if let Some(conclusion) = not_distinguished(settled).filter(|_| settings.inputs == Inputs::Designed) {
         return Ok(Err(conclusion));
     }
+    let at = |limit: &str| Ok(Err(unsettled(limit, &report.contenders, &report.remains)));
     if rounds >= settings.rounds {
-        return Ok(Err(format!("the limit of rounds, {rounds}, was reached")));
+        return at(&format!("the limit of rounds, {rounds}, was reached"));
     }
     if left_s < LEAST_ROUND_S {
-        return Ok(Err(format!(
-            "{played:.0} s of motion were played, and {:.0} s are allowed",
-            settings.rounds_s()
-        )));
+        let allowed_s = settings.rounds_s();
+        return at(&format!("{played:.0} s of motion were played, and {allowed_s:.0} s are allowed"));
     }
     next(limited, report, folder, settings, (rounds, left_s))
+}
+
+/// The conclusion at a limit: what still contends, and how much of the force nothing explains.
+fn unsettled(limit: &str, contenders: &[Contending], remains: &str) -> String {
+    let named = |one: &Contending| one.name.map_or("no effect", |name| name.as_str());
+    let contenders: Vec<&str> = contenders.iter().map(named).collect();
+    let undecided = match contenders.as_slice() {
+        [] | [_] => String::new(),
+        several => format!("; not decided between {}", several.join(", ")),
+    };
+    format!("{limit}{undecided}; what remains is {remains}")
 }
 
 /// Speeds and forces of later general rounds, as parts of those of the first of them: a round that
@@ -144,6 +154,7 @@ fn next(
 mod tests {
     use super::*;
     use crate::settle::{Name, Round};
+    use diagnosis::effects::EffectName;
 
     fn round(class: &[&str]) -> Round {
         let class: Vec<String> = class.iter().map(|name| (*name).to_owned()).collect();
@@ -151,6 +162,20 @@ mod tests {
         let (asked, why, sentence) = (String::new(), String::new(), String::new());
         let designed_against = ["command_delay", "electrical_lag", "none"].map(str::to_owned).to_vec();
         Round { asked, why, designed_against, seconds: 20.0, sentence, contenders: vec![], names }
+    }
+
+    #[test]
+    fn at_a_limit_it_says_what_is_open() {
+        let contender = |name| Contending { name, probability: 0.5, rig: String::new() };
+        let both = [contender(Some(EffectName::TiltGravity)), contender(None)];
+        let remains = "47.8 % of the force: a further effect is missing";
+        assert_eq!(
+            unsettled("the limit of rounds, 2, was reached", &both, remains),
+            format!(
+                "the limit of rounds, 2, was reached; not decided between tilt_gravity, no effect; what remains is {remains}"
+            )
+        );
+        assert_eq!(unsettled("enough", &[], remains), format!("enough; what remains is {remains}"));
     }
 
     #[test]
