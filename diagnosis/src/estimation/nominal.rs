@@ -135,6 +135,18 @@ impl Nominal {
         }
     }
 
+    fn ratio_prior(&self) -> Prior {
+        let (mean, sd) = self.anchor.unwrap_or((self.gain(), self.gain_sd()));
+        let (a, b) = (mean / (1.0 + RATIO_REACH * sd), mean / (1.0 - RATIO_REACH * sd).max(0.05));
+        Prior { mean, sd: sd * mean.abs(), low: a.min(b), high: a.max(b) }
+    }
+
+    /// True if a fitted gain over inertia stopped at a limit of its refit.
+    pub(crate) fn is_at_limit(&self, ratio: f64) -> bool {
+        let Prior { low, high, .. } = self.ratio_prior();
+        [low, high].iter().any(|limit| (ratio - limit).abs() <= 1e-6 * limit.abs())
+    }
+
     pub(super) fn priors(&self, key: Key, noise: &Noise) -> Prior {
         let rig = &self.rig;
         let j = self.known_inertia();
@@ -148,11 +160,7 @@ impl Nominal {
             Prior { mean, sd: sd / least * mean.abs(), low: a.min(b), high: a.max(b) }
         };
         match key {
-            Key::Gain => {
-                let (mean, sd) = self.anchor.unwrap_or((self.gain(), self.gain_sd()));
-                let (a, b) = (mean / (1.0 + RATIO_REACH * sd), mean / (1.0 - RATIO_REACH * sd).max(0.05));
-                Prior { mean, sd: sd * mean.abs(), low: a.min(b), high: a.max(b) }
-            }
+            Key::Gain => self.ratio_prior(),
             Key::Viscous => relative(rig.model.viscous.unwrap_or(0.0), rig.viscous_sd()),
             Key::Coulomb => relative(rig.model.coulomb.unwrap_or(0.0), rig.coulomb_sd()),
             Key::Weight => relative(rig.model.weight.unwrap_or(0.0), rig.weight_sd()),

@@ -88,12 +88,14 @@ pub(crate) fn decide(
 
 /// Returns the values of the rig that a fit moved.
 fn moved(nominal: &Nominal, fit: &Fit) -> Moved {
-    let by_gain = fit.value(Key::Gain).map_or(1.0, |ratio| nominal.gain() / ratio);
+    let ratio = fit.value(Key::Gain).unwrap_or(nominal.gain());
+    let by_gain = nominal.gain() / ratio;
     let is_known = nominal.virtual_inertia == 0.0 && by_gain > 0.0;
     Moved {
         late_rows: skew::total_rows(nominal, fit),
         inertia_by_gain: by_gain,
         deviations: if is_known { by_gain.ln() / nominal.gain_sd() } else { 0.0 },
+        is_at_limit: is_known && nominal.is_at_limit(ratio),
     }
 }
 

@@ -61,6 +61,8 @@ pub(crate) struct Moved {
     /// Distance of that from 1, in standard deviations of the rig's uncertainty; zero where the
     /// rig's inertia hardly matters.
     pub(crate) deviations: f64,
+    /// True if it stopped at the limit that the rig's uncertainty sets.
+    pub(crate) is_at_limit: bool,
 }
 
 /// A diagnosis of recordings that sufficed for a verdict.

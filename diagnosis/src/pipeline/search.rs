@@ -16,6 +16,7 @@ use crate::selection::{candidates, joint};
 use crate::thresholds::MIN_LOG_LIKELIHOOD_GAIN;
 use crate::validation::effect_evidence::gather_evidence;
 use crate::validation::elimination::{RejectedHypothesis, StandingModel, eliminate};
+use crate::validation::holdout_likelihood::{compare, evaluate_all};
 use crate::validation::holdout_set::HoldoutSet;
 use crate::validation::parameters;
 use crate::validation::rejection::Rejection;
@@ -198,6 +199,7 @@ impl Search<'_> {
             tried.count += 1;
             self.goes_on(SEARCHING);
             let name = finalist.model.effects.last().expect("a finalist adds an effect").name;
+            let finalist = self.with_enough_laws(&on, now, finalist);
             match self.judge(now, finalist, promising.is_none()) {
                 Judged::Generalises(state) => return Some(Next { state, generalises: true }),
                 Judged::Rejected { holdout_gain, why, provisional } => {
@@ -208,6 +210,17 @@ impl Search<'_> {
             }
         }
         promising
+    }
+
+    /// Returns the candidate, or its rival with one periodic law fewer where the held-out
+    /// recordings are as likely with that.
+    fn with_enough_laws(&self, on: &FitContext, now: &SearchState, candidate: FittedModel) -> FittedModel {
+        let Some(rival) = on.with_fewer_laws(&candidate) else { return candidate };
+        let evaluated = |one: &FittedModel| {
+            evaluate_all(one, on.nominal, &now.holdout.judging(&one.model, on.span), &one.noise)
+        };
+        let gain = compare(&evaluated(&rival), &evaluated(&candidate)).sum;
+        if gain >= 0.0 { rival } else { candidate }
     }
 
     /// Judges a model with one more effect; where it is rejected and `may_promise`, it is kept if

@@ -12,7 +12,7 @@ const SKEWED: f64 = 0.005;
 /// The notes, each a clause.
 pub(crate) fn notes(moved: &Moved) -> Vec<String> {
     let timing = moved.late_rows.filter(|rows| rows.abs() >= SKEWED).map(timing);
-    let inertia = (moved.deviations.abs() >= FAR).then(|| inertia(moved));
+    let inertia = (moved.is_at_limit || moved.deviations.abs() >= FAR).then(|| inertia(moved));
     timing.into_iter().chain(inertia).collect()
 }
 
@@ -22,11 +22,14 @@ fn timing(rows: f64) -> String {
 }
 
 fn inertia(moved: &Moved) -> String {
+    let far = if moved.is_at_limit {
+        "as far as the rig's uncertainty allows".to_owned()
+    } else {
+        format!("{:.1} of its standard deviations away", moved.deviations.abs())
+    };
     format!(
-        "the refit makes the inertia over the drive's gain {:.2} times the rig's, {:.1} of its standard deviations away: check both \
-         values, or the units",
+        "the refit makes the inertia over the drive's gain {:.2} times the rig's, {far}: check both values, or the units",
         moved.inertia_by_gain,
-        moved.deviations.abs()
     )
 }
 
@@ -36,11 +39,14 @@ mod tests {
 
     #[test]
     fn a_far_inertia_and_a_visible_skew_are_reported() {
-        let near = Moved { late_rows: None, inertia_by_gain: 1.1, deviations: -0.6 };
+        let near = Moved { late_rows: None, inertia_by_gain: 1.1, deviations: -0.6, is_at_limit: false };
         assert!(notes(&near).is_empty());
         assert!(notes(&Moved { late_rows: Some(0.002), ..near }).is_empty());
-        let both = notes(&Moved { late_rows: Some(-0.5), inertia_by_gain: 0.1, deviations: 3.5 });
+        let far = Moved { inertia_by_gain: 0.1, deviations: 3.5, ..near };
+        let both = notes(&Moved { late_rows: Some(-0.5), ..far });
         assert!(both[0].contains("0.50 rows before"), "{both:?}");
         assert!(both[1].contains("0.10 times the rig's, 3.5 of"), "{both:?}");
+        let at_limit = notes(&Moved { inertia_by_gain: 4.64, deviations: 1.47, is_at_limit: true, ..near });
+        assert!(at_limit[0].contains("4.64 times the rig's, as far as"), "{at_limit:?}");
     }
 }

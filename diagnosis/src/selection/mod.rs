@@ -7,6 +7,7 @@ pub(crate) mod context;
 pub(crate) mod excitation;
 pub(crate) mod free_form;
 pub(crate) mod joint;
+pub(crate) mod more_waves;
 pub(crate) mod periodic;
 pub(crate) mod predictive;
 pub(crate) mod score_statistic;
