@@ -94,6 +94,7 @@ fn anticogging_names_cogging() {
         .filter(|(k, _)| k.starts_with("order_"))
         .max_by(|a, b| a.1.value.total_cmp(&b.1.value));
     assert_eq!(strongest.expect("there are orders").0, "order_7");
+    assert!(outcome.report.notes.iter().any(|note| note.contains("as far as")), "{:?}", outcome.report.notes);
     // Variance of the held-out force about its mean that is explained.
     let series = outcome.evidence.series.iter().find(|s| s.held_out).expect("one is held out");
     let variance = |values: &[f64]| {
@@ -103,10 +104,9 @@ fn anticogging_names_cogging() {
     let (force, left): (Vec<f64>, Vec<f64>) =
         series.force.iter().zip(&series.patched).filter_map(|(f, p)| p.map(|p| (*f, p))).unzip();
     let explained = 1.0 - variance(&left) / variance(&force);
-    // Of 0.87 by a map of another measurement: nothing here shows the inertia, which is known to
-    // 100 % only and is refitted to the limit, and its force is noise.
-    assert!(explained >= 0.65, "{explained:.3} of the variance explained");
-    assert!(outcome.report.notes.iter().any(|note| note.contains("as far as")), "{:?}", outcome.report.notes);
+    // 0.87 by a map of another measurement. 0.68 is reached: nothing here shows the inertia, which
+    // the rig knows to 100 % and the refit moves to its limit.
+    assert!(explained >= 0.85, "{explained:.3} of the variance explained");
 }
 
 #[test]
