@@ -2,9 +2,9 @@
 //! table. A program gives a row by printing `name=value`, with a name of [`crate::rows`], or as
 //! JSON, `"row": "name", … "value": …`; a peer in the same row by `name.peer=who
 //! name.peer_value=…`; the time of an amount of work by `work.subject.unit.amount=seconds`. A row
-//! that nothing measures is left out, and a missing peer is named: no number here was written by
-//! hand. Lines that a test of the emulated board begins with a bar are printed unchanged below the
-//! table.
+//! that nothing measures is an error at the end, and a missing peer is named: no number here was
+//! written by hand. Lines that a test of the emulated board begins with a bar are printed unchanged
+//! below the table.
 
 mod fit;
 mod programs;
@@ -15,6 +15,7 @@ mod work;
 
 use crate::rows::ROWS;
 use crate::shell::{self, Error};
+use crate::{boards, firmware};
 use programs::{EXAMPLES, PEERS};
 use std::fs;
 use std::process::{Command, Stdio};
@@ -35,9 +36,10 @@ pub(crate) fn run(names: &[String]) -> Result<(), Error> {
     bench.measure_programs();
     bench.measure_whole();
     bench.measure_tests()?;
-    let Bench { mut values, board_lines, errors, .. } = bench;
-    let works = work::works(&values);
-    values.extend(work::growths(&works));
+    let works = work::works(&bench.values);
+    bench.values.extend(work::growths(&works));
+    bench.name_unmeasured();
+    let Bench { values, board_lines, errors, .. } = bench;
     let rows: Vec<Measured> = ROWS
         .into_iter()
         .filter_map(|row| Some((row, values.get(row.name)?.parse().ok()?, peer(&values, row.name))))
@@ -129,13 +131,26 @@ impl Bench<'_> {
         self.measure(&["diagnose_60s_", "diagnose_peak_"], "diagnosis", whole::diagnosis);
     }
 
+    /// Makes errors of the rows that are wanted and have no value: what printed them may have
+    /// moved.
+    fn name_unmeasured(&mut self) {
+        let missing = ROWS.iter().filter(|row| self.wants(row.name) && !self.values.contains_key(row.name));
+        let missing: Vec<String> = missing.map(|row| format!("nothing measured `{}`", row.name)).collect();
+        self.errors.extend(missing);
+    }
+
     fn measure_tests(&mut self) -> Result<(), Error> {
-        for module in programs::test_modules()? {
-            if module.measures(|rows| self.wants(rows)) {
-                match module.run(&mut self.board_lines) {
-                    Ok(new) => self.values.extend(new),
-                    Err(error) => self.errors.push(format!("{}: {error}", module.name)),
-                }
+        let mut modules = programs::test_modules()?;
+        modules.retain(|module| module.measures(|rows| self.wants(rows)));
+        if modules.iter().any(programs::TestModule::is_of_a_board) {
+            for board in &boards::ALL {
+                firmware::build(board)?;
+            }
+        }
+        for module in modules {
+            match module.run(&mut self.board_lines) {
+                Ok(new) => self.values.extend(new),
+                Err(error) => self.errors.push(format!("{}: {error}", module.name)),
             }
         }
         Ok(())

@@ -205,6 +205,7 @@ fn a_tick_takes_at_most_840_instructions() {
     let longest = profile.longest("default");
     let (used, size) = board.stack_use().expect("the image says where its stack is");
     println!("| stack | {used} of {size} bytes |");
+    println!("stack_high_water_bytes={used}");
     println!("tick_instructions_longest={longest}");
     assert!(longest <= LONGEST, "a tick of {longest} instructions");
     assert!(2 * used <= size, "more than half of the stack was used: {used} of {size} bytes");

@@ -6,13 +6,14 @@ use crate::shell::{self, Error, cargo};
 use crate::workspace_build::{BUILD, built};
 use crate::{boards, firmware, setup};
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 /// The test programs of the crate `tests`: a folder each.
-const TEST_PROGRAMS: [&str; 2] = ["board", "page"];
+const TEST_PROGRAMS: [&str; 2] = [BOARD, "page"];
+const BOARD: &str = "board";
 
-/// A file of tests.
+/// A file of tests, with those of the folder that has its name.
 pub(crate) struct TestModule {
     program: &'static str,
     pub(crate) name: String,
@@ -24,20 +25,33 @@ pub(crate) fn test_modules() -> Result<Vec<TestModule>, Error> {
     let mut modules = vec![];
     for program in TEST_PROGRAMS {
         let folder = shell::top().join("tests/tests").join(program);
-        let unreadable = |error| Error::new(format!("{} cannot be read: {error}", folder.display()));
-        for path in fs::read_dir(&folder).map_err(unreadable)?.flatten().map(|entry| entry.path()) {
+        for path in sources_in(&folder)? {
             let Some(name) = path.file_stem().and_then(|stem| stem.to_str()) else { continue };
-            let is_source = path.extension().is_some_and(|extension| extension == "rs");
-            if let (true, Ok(text)) = (is_source, fs::read_to_string(&path)) {
-                modules.push(TestModule { program, name: name.into(), text });
+            let mut parts = vec![path.clone()];
+            if folder.join(name).is_dir() {
+                parts.extend(sources_in(&folder.join(name))?);
             }
+            let text = parts.iter().filter_map(|part| fs::read_to_string(part).ok()).collect();
+            modules.push(TestModule { program, name: name.into(), text });
         }
     }
     modules.sort_by(|a, b| (a.program, &a.name).cmp(&(b.program, &b.name)));
     Ok(modules)
 }
 
+/// The sources in a folder, without those in its folders.
+fn sources_in(folder: &Path) -> Result<Vec<PathBuf>, Error> {
+    let unreadable = |error| Error::new(format!("{} cannot be read: {error}", folder.display()));
+    let all = fs::read_dir(folder).map_err(unreadable)?.flatten().map(|entry| entry.path());
+    Ok(all.filter(|path| path.extension().is_some_and(|extension| extension == "rs")).collect())
+}
+
 impl TestModule {
+    /// True if the tests run the boards' flash images.
+    pub(crate) fn is_of_a_board(&self) -> bool {
+        self.program == BOARD
+    }
+
     /// True if the tests print rows, of which their text names one as a word or in JSON, or lines
     /// of the board's own table.
     pub(crate) fn measures(&self, wants: impl Fn(&str) -> bool) -> bool {
@@ -113,4 +127,28 @@ pub(crate) fn class() -> Result<Values, Error> {
     test.arg("test").args(BUILD).args(["--quiet", "--features", "host-sim/class", "--test", "program", "--"]);
     test.args(["--ignored", "--nocapture", "thirty_devices_cost_little_more_than_a_core"]);
     shell::output(&mut test).map(|text| values_in(&text))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_rows_of_the_board_and_the_page_have_tests() {
+        let modules = test_modules().expect("the tests are there");
+        let rows = [
+            "tick_instructions_longest",
+            "tick_to_dac_spread_us",
+            "stack_high_water_bytes",
+            "masked_longest_us",
+            "hand_to_page_p50_ms",
+            "hand_to_page_p99_ms",
+            "page_first_frame_s",
+            "page_mb",
+        ];
+        for row in rows {
+            assert!(ROWS.iter().any(|one| one.name == row), "{row}");
+            assert!(modules.iter().any(|module| module.measures(|rows| row.starts_with(rows))), "{row}");
+        }
+    }
 }
