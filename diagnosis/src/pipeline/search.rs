@@ -373,3 +373,6 @@ fn order_near_ties(context: &FitContext, before: f64, finalists: &mut [FittedMod
     };
     finalists[..near].sort_by_cached_key(|c| left(c).to_bits());
 }
+
+#[cfg(test)]
+mod tests;

@@ -8,6 +8,9 @@ use crate::io::schema::{Report, Verdict};
 pub(crate) const MORE: f64 = 3.0;
 const NOTHING: f64 = 1.5;
 
+/// The next recording where something is still missing.
+const FURTHER: &str = "the same motion twice, then slower and faster: the differences show whether the force depends on time, speed or position";
+
 /// The patched model's residual on held-out recordings, over the residual that the sensor's noise
 /// alone causes; none where nothing was fitted, or the sensor has no noise to speak of.
 pub(crate) fn of_noise(report: &Report) -> Option<f64> {
@@ -55,15 +58,14 @@ fn record_next(report: &Report) -> String {
         return experiment.clone();
     }
     match report.verdict {
+        Verdict::MissingPhysics if of_noise(report).is_some_and(|ratio| ratio >= MORE) => FURTHER,
         Verdict::MissingPhysics => {
             "nothing more is needed; to confirm, record again on another day, at other speeds and loads"
         }
         Verdict::NoMismatch | Verdict::ParametersOnly => {
             "nothing; keep a recording of another day to hold out, as machines change"
         }
-        Verdict::Unexplained => {
-            "the same motion twice, then slower and faster: the differences show whether the force depends on time, speed or position"
-        }
+        Verdict::Unexplained => FURTHER,
         Verdict::RandomDisturbance => {
             "the same motion twice, with what may move the axis (a hand, a load, the inclination) as `force` or `tilt_rad`"
         }
@@ -119,6 +121,8 @@ mod tests {
         for verdict in all {
             let mut report = report(verdict, 0.01);
             assert!(!report.record_next.is_empty(), "{verdict:?}");
+            let is_done = report.record_next.starts_with("nothing");
+            assert!(!is_done || verdict != Verdict::MissingPhysics, "5 times the noise: {verdict:?}");
             report.separating_experiment = Some("a slow triangle".into());
             assert_eq!(record_next(&report), "a slow triangle", "what would decide goes first");
         }

@@ -5,6 +5,7 @@
 use crate::effects::Effect;
 use crate::estimation::noise::Colour;
 use crate::selection::context::{FitContext, FittedModel};
+use crate::selection::periodic::are_apart;
 use std::f64::consts::TAU;
 
 impl FitContext<'_> {
@@ -17,16 +18,18 @@ impl FitContext<'_> {
             let mut model = candidate.model.clone();
             model.effects = before.to_vec();
             model.effects.remove(place);
-            model.effects.push(with_waves_of(own, added)?);
+            model.effects.push(with_waves_of(own, added, self.span.travel())?);
             Some(self.fit(model, &candidate.noise, Colour::White))
         });
         widened.max_by(|a, b| a.merit.total_cmp(&b.merit))
     }
 }
 
-/// A periodic force with the waves of another one in addition to its own; none where either is no
-/// such force, or its own waves are all that there are.
-fn with_waves_of(own: &Effect, other: &Effect) -> Option<Effect> {
+/// A periodic force with the waves of another one in addition to its own, those that a travel (rad
+/// or m) distinguishes from its own; none where either is no such force, or where it distinguishes
+/// none. Each wave was found by the search of its own law, so there may be more than one search
+/// finds.
+fn with_waves_of(own: &Effect, other: &Effect, travel: f64) -> Option<Effect> {
     let is_periodic = |effect: &Effect| effect.name.definition().is_periodic();
     if !is_periodic(own) || !is_periodic(other) || own.name == other.name || own.turn() != other.turn() {
         return None;
@@ -34,7 +37,7 @@ fn with_waves_of(own: &Effect, other: &Effect) -> Option<Effect> {
     let lengths = |effect: &Effect| effect.waves().into_iter().map(|(_, wave)| TAU / wave);
     let mut periods: Vec<f64> = lengths(own).collect();
     let count = periods.len();
-    let is_new = |period: &f64| lengths(own).all(|one| (one / period - 1.0).abs() > SAME);
+    let is_new = |period: &f64| lengths(own).all(|one| are_apart(travel / one, travel / period, 1.0));
     periods.extend(lengths(other).filter(is_new));
     if periods.len() == count {
         return None;
@@ -47,9 +50,6 @@ fn with_waves_of(own: &Effect, other: &Effect) -> Option<Effect> {
     Some(Effect::of_periods(own.name, &periods))
 }
 
-/// Part of a period by which two periods may differ and be the same.
-const SAME: f64 = 1e-3;
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -60,17 +60,19 @@ mod tests {
         let cogging = Effect::of_orders(N::Cogging, TAU, &[7.0, 14.0]);
         let ripple = |orders: &[f64]| Effect::of_orders(N::TorqueRipple, TAU, orders);
         let joined = Effect::of_orders(N::Cogging, TAU, &[7.0, 14.0, 28.0]);
-        assert_eq!(with_waves_of(&cogging, &ripple(&[28.0])), Some(joined.clone()));
-        assert_eq!(with_waves_of(&cogging, &ripple(&[14.0, 28.0])), Some(joined));
-        assert_eq!(with_waves_of(&cogging, &ripple(&[7.0])), None, "it has that wave");
-        assert_eq!(with_waves_of(&cogging, &cogging), None, "the same law");
+        assert_eq!(with_waves_of(&cogging, &ripple(&[28.0]), TAU), Some(joined.clone()));
+        assert_eq!(with_waves_of(&cogging, &ripple(&[14.0, 28.0]), TAU), Some(joined));
+        assert_eq!(with_waves_of(&cogging, &ripple(&[7.0]), TAU), None, "it has that wave");
+        assert_eq!(with_waves_of(&cogging, &cogging, TAU), None, "the same law");
+        let eighth = with_waves_of(&cogging, &ripple(&[15.0]), TAU / 8.0);
+        assert_eq!(eighth, None, "an eighth of a turn does not tell orders 14 and 15 apart");
         let along = Effect::of_periods(N::Cogging, &[0.02, 0.1]);
         let other = Effect::of_periods(N::TorqueRipple, &[0.05]);
         let joined = Effect::of_periods(N::Cogging, &[0.02, 0.05, 0.1]);
-        assert_eq!(with_waves_of(&along, &other), Some(joined));
-        assert_eq!(with_waves_of(&along, &ripple(&[2.0])), None, "its turn is not known");
+        assert_eq!(with_waves_of(&along, &other, 1.0), Some(joined));
+        assert_eq!(with_waves_of(&along, &ripple(&[2.0]), 1.0), None, "its turn is not known");
         let off_centre = Effect::of_orders(N::EncoderEccentricity, TAU, &[1.0]);
-        assert_eq!(with_waves_of(&off_centre, &ripple(&[2.0])), None, "no force");
-        assert_eq!(with_waves_of(&cogging, &off_centre), None, "no force");
+        assert_eq!(with_waves_of(&off_centre, &ripple(&[2.0]), TAU), None, "no force");
+        assert_eq!(with_waves_of(&cogging, &off_centre, TAU), None, "no force");
     }
 }
