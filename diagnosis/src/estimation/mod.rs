@@ -19,6 +19,7 @@ pub(crate) mod quasi_static;
 pub(crate) mod reading_lag;
 pub(crate) mod refit;
 pub(crate) mod regressors;
+mod seen_inertia;
 pub(crate) mod skew;
 pub(crate) mod skew_columns;
 pub(crate) mod slices;

@@ -35,6 +35,15 @@ pub(crate) enum Key {
     },
 }
 
+/// An inertia that fits whose values are shown keep.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Kept {
+    /// Gain over inertia, seen in the band that the counts support.
+    Seen(f64),
+    /// The rig's: the recordings show none.
+    OfRig,
+}
+
 /// The nominal model in units of acceleration, with what may move.
 #[derive(Debug, Clone)]
 pub(crate) struct Nominal {
@@ -44,6 +53,9 @@ pub(crate) struct Nominal {
     /// Gain over inertia found from force where the rig hardly knows it: (value, relative standard
     /// deviation).
     pub(crate) anchor: Option<(f64, f64)>,
+    /// The inertia of fits whose values are shown, where the rig hardly knows it and noise hides it
+    /// from the fits of the search.
+    pub(crate) kept_inertia: Option<Kept>,
     /// True if the refit explains most of the force.
     pub(crate) is_balanced: bool,
     /// Inertia added to rig and command alike, where the machine's own hardly matters, kg·m² or kg.
@@ -59,6 +71,9 @@ const REACH: f64 = 3.0;
 const RATIO_REACH: f64 = 3.5;
 /// The number of standard deviations by which a nominal value may be below the truth.
 const FARTHEST: f64 = 2.5;
+
+/// Relative standard deviation of a gain over inertia that is kept.
+const KEPT: f64 = 0.02;
 
 /// Least part of the truth that a nominal value of some relative standard deviation may be.
 fn least_of_truth(sd: f64) -> f64 {
@@ -84,10 +99,22 @@ impl Nominal {
             rig: rig.clone(),
             external: 0.0,
             anchor: None,
+            kept_inertia: None,
             is_balanced: false,
             virtual_inertia: 0.0,
             skew_rows: None,
         }
+    }
+
+    /// The nominal model whose fits are shown: they keep an inertia that noise hides, as a fit
+    /// under a speed loop makes it as heavy as it may be.
+    pub(crate) fn shown(&self) -> Self {
+        let anchor = match self.kept_inertia {
+            Some(Kept::Seen(gain)) => Some((gain, KEPT)),
+            Some(Kept::OfRig) => Some((self.gain(), KEPT)),
+            None => self.anchor,
+        };
+        Self { anchor, ..self.clone() }
     }
 
     /// Gain over inertia as the rig states it.

@@ -8,8 +8,8 @@ use crate::estimation::input::Total;
 use crate::estimation::model::Model;
 use crate::estimation::noise::{self, Colour};
 use crate::estimation::nominal::{Key, Nominal};
+use crate::estimation::seen_inertia;
 use crate::estimation::smoother::{Knows, motion};
-use crate::numerics::linear::{Prior, Square, bounded};
 
 /// Rests are dilated by this many blocks: the sign is uncertain next to a reversal.
 const MARGIN: usize = 1;
@@ -173,55 +173,6 @@ pub(crate) fn estimate_motion(
 /// Relative standard deviation of gain over inertia above which the rig hardly knows it.
 const LOOSE: f64 = 0.5;
 
-/// Anchors the inertia if the rig hardly knows it: slow motion under a speed loop is explained as
-/// well by an axis too heavy to be moved as by forces in balance. Regressing the command on the
-/// motion, rather than the motion on the command, has no such way out; what it finds anchors the
-/// fits that follow. A result out of reach is ignored: if the largest forces are missing from the
-/// model, the motion says nothing about the inertia.
-fn anchor(nominal: &mut Nominal, fit: &Fit) {
-    let size = fit.keys.len();
-    // Unknowns: the data's own column takes the place of the gain's.
-    let mut m = Square::zero(size);
-    let mut b = vec![0.0; size];
-    for (one, places) in fit.prepared.iter().zip(&fit.places) {
-        let p = places.len();
-        // Undo the reference: the data itself is the residual plus the reference's columns.
-        let mut raw: Vec<f64> = one.reference.clone();
-        raw.push(1.0);
-        for segment in &one.segments {
-            let with_raw: Vec<f64> =
-                (0..=p).map(|i| (0..=p).map(|j| segment.at(i, j) * raw[j]).sum()).collect();
-            let raw_square: f64 = with_raw.iter().zip(&raw).map(|(a, b)| a * b).sum();
-            // Column 0 is the gain's: command = (1/gain)·data − Σ forces/gain.
-            let inner = |i: usize, j: usize| match (i, j) {
-                (0, 0) => raw_square,
-                (0, j) => with_raw[j],
-                (i, 0) => with_raw[i],
-                (i, j) => segment.at(i, j),
-            };
-            for i in 0..p {
-                b[places[i]] += if i == 0 { with_raw[0] } else { segment.at(i, 0) };
-                for j in 0..p {
-                    m.add(places[i], places[j], inner(i, j));
-                }
-            }
-        }
-    }
-    let solution = bounded(&m, &b, &vec![Prior::FREE; size]);
-    let place = fit.places[0][0];
-    nominal.anchor = anchored(1.0 / solution.x[place], nominal.gain()).map(|gain| (gain, 0.3));
-}
-
-/// Factor by which a gain over inertia that is hardly known may differ from the rig's.
-const ANCHOR_REACH: f64 = 40.0;
-
-/// Returns the gain over inertia that was found, if it has the sign of the rig's and is within
-/// reach of it.
-fn anchored(found: f64, nominal: f64) -> Option<f64> {
-    let reach = ANCHOR_REACH.recip()..ANCHOR_REACH;
-    reach.contains(&(found / nominal)).then_some(found)
-}
-
 /// The sign with which the measured load acts, where it is seen to act as a load does.
 fn load_sign(nominal: &Nominal, fit: &Fit) -> Option<f64> {
     let seen = fit.value(Key::External)? * nominal.rig.model.inertia;
@@ -293,7 +244,7 @@ pub(crate) fn settle(nominal: &mut Nominal, tracks: &mut [BlockedRecording]) -> 
     for round in 0..2 {
         if round == 0 && nominal.gain_sd() > LOOSE {
             let white = noise::estimate(tracks, &totals, &noise, scale, Colour::White);
-            anchor(nominal, &Fit::new(&model, nominal, tracks, &white));
+            seen_inertia::anchor(nominal, tracks, &white, scale);
             scale = acceleration_scale(nominal, tracks);
             fit = Fit::new(&model, nominal, tracks, &noise);
         }

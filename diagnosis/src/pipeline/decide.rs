@@ -14,7 +14,7 @@ use crate::effects::EffectName;
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::fit::Fit;
 use crate::estimation::force_residual::Estimator;
-use crate::estimation::nominal::{Key, Nominal};
+use crate::estimation::nominal::{Kept, Key, Nominal};
 use crate::estimation::skew;
 use crate::io::recording::Recording;
 use crate::io::rig::Rig;
@@ -96,6 +96,7 @@ fn moved(nominal: &Nominal, fit: &Fit) -> Moved {
         inertia_by_gain: by_gain,
         deviations: if is_known { by_gain.ln() / nominal.gain_sd() } else { 0.0 },
         is_at_limit: is_known && nominal.is_at_limit(ratio),
+        is_hidden: nominal.kept_inertia == Some(Kept::OfRig),
     }
 }
 

@@ -63,6 +63,8 @@ pub(crate) struct Moved {
     pub(crate) deviations: f64,
     /// True if it stopped at the limit that the rig's uncertainty sets.
     pub(crate) is_at_limit: bool,
+    /// True if the recordings do not show the inertia, so that the rig's was kept.
+    pub(crate) is_hidden: bool,
 }
 
 /// A diagnosis of recordings that sufficed for a verdict.

@@ -9,10 +9,19 @@ const FAR: f64 = 2.0;
 /// digit shown.
 const SKEWED: f64 = 0.005;
 
+/// The note where the motion shows no inertia.
+const HIDDEN: &str =
+    "the recordings do not show the inertia, so the rig's is kept: a faster motion would show it";
+
 /// The notes, each a clause.
 pub(crate) fn notes(moved: &Moved) -> Vec<String> {
     let timing = moved.late_rows.filter(|rows| rows.abs() >= SKEWED).map(timing);
-    let inertia = (moved.is_at_limit || moved.deviations.abs() >= FAR).then(|| inertia(moved));
+    let is_far = moved.is_at_limit || moved.deviations.abs() >= FAR;
+    let inertia = match (moved.is_hidden, is_far) {
+        (true, _) => Some(HIDDEN.to_owned()),
+        (false, true) => Some(inertia(moved)),
+        (false, false) => None,
+    };
     timing.into_iter().chain(inertia).collect()
 }
 
@@ -39,7 +48,13 @@ mod tests {
 
     #[test]
     fn a_far_inertia_and_a_visible_skew_are_reported() {
-        let near = Moved { late_rows: None, inertia_by_gain: 1.1, deviations: -0.6, is_at_limit: false };
+        let near = Moved {
+            late_rows: None,
+            inertia_by_gain: 1.1,
+            deviations: -0.6,
+            is_at_limit: false,
+            is_hidden: false,
+        };
         assert!(notes(&near).is_empty());
         assert!(notes(&Moved { late_rows: Some(0.002), ..near }).is_empty());
         let far = Moved { inertia_by_gain: 0.1, deviations: 3.5, ..near };
@@ -48,5 +63,7 @@ mod tests {
         assert!(both[1].contains("0.10 times the rig's, 3.5 of"), "{both:?}");
         let at_limit = notes(&Moved { inertia_by_gain: 4.64, deviations: 1.47, is_at_limit: true, ..near });
         assert!(at_limit[0].contains("4.64 times the rig's, as far as"), "{at_limit:?}");
+        let hidden = notes(&Moved { is_at_limit: true, is_hidden: true, ..near });
+        assert!(hidden.len() == 1 && hidden[0].contains("do not show the inertia"), "{hidden:?}");
     }
 }

@@ -61,8 +61,10 @@ impl FitContext<'_> {
     /// fitted to the force in the band that people see: likelihoods count what is fast most, where
     /// a machine is least like its model.
     pub(crate) fn fit_shown(&self, model: Model, from: &Noise, by_shares: bool) -> FittedModel {
-        let white = self.fit(model, from, Colour::White);
-        if by_shares { self.fit_in_band(white) } else { white }
+        let nominal = self.nominal.shown();
+        let shown = FitContext { nominal: &nominal, ..*self };
+        let white = shown.fit(model, from, Colour::White);
+        if by_shares { shown.fit_in_band(white) } else { white }
     }
 
     /// Fits a model again, to the force in the band that people see.

@@ -17,15 +17,6 @@ fn stopped_for_a_moment() -> BlockedRecording {
 }
 
 #[test]
-fn a_gain_out_of_reach_anchors_nothing() {
-    assert_eq!(anchored(-30.0, -2.0), Some(-30.0));
-    assert_eq!(anchored(100.0, 2.0), None, "too light");
-    assert_eq!(anchored(0.01, 2.0), None, "too heavy");
-    assert_eq!(anchored(-3.0, 2.0), None, "of the wrong sign");
-    assert_eq!(anchored(f64::INFINITY, 2.0), None);
-}
-
-#[test]
 fn an_axis_rests_where_expected_counts_do_not_come() {
     let track = stopped_for_a_moment();
     let count = track.blocks.z[1] - track.blocks.z[0];
