@@ -20,7 +20,8 @@ pub(crate) fn patch(given: &Rig, nominal: &Nominal, fit: &[BlockedRecording], la
     let (inertia, gain, _) = parameters::scale(nominal, last);
     // What was added to rig and command alike is no inertia of the machine.
     let added = nominal.virtual_inertia * gain / nominal.rig.actuator.gain;
-    rig.model.inertia = (inertia - added).max(LEAST_INERTIA * given.model.inertia);
+    let least = if added == 0.0 { 0.0 } else { LEAST_INERTIA * given.model.inertia };
+    rig.model.inertia = (inertia - added).max(least);
     rig.actuator.gain = gain;
     let value = |key: Key| last.fit.value(key).map(|x| x * inertia);
     if let Some(x) = value(Key::Viscous) {

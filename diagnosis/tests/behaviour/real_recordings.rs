@@ -97,6 +97,9 @@ fn anticogging_names_cogging() {
     // A regression of the command below 36 Hz finds 8e-6 kg·m² in the fast move; the rig says 1e-4.
     let notes = &outcome.report.notes;
     assert!(notes.iter().any(|note| note.contains("0.07 times the rig's")), "{notes:?}");
+    let by_gain = |rig: &Rig| rig.model.inertia / rig.actuator.gain;
+    let patched = by_gain(&outcome.patched_rig) / by_gain(&outcome.nominal_rig);
+    assert!((0.065..0.075).contains(&patched), "{patched} times the rig's in the patched rig");
     assert!(outcome.report.fit.patched.fit < 0.5 * outcome.report.fit.force_rms.fit);
     // Variance of the held-out force about its mean that is explained.
     let series = outcome.evidence.series.iter().find(|s| s.held_out).expect("one is held out");
