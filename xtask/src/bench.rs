@@ -143,9 +143,8 @@ impl Bench<'_> {
         let mut modules = programs::test_modules()?;
         modules.retain(|module| module.measures(|rows| self.wants(rows)));
         if modules.iter().any(programs::TestModule::is_of_a_board) {
-            for board in &boards::ALL {
-                firmware::build(board)?;
-            }
+            let images = boards::ALL.iter().try_for_each(|board| firmware::build(board).map(drop));
+            self.errors.extend(images.err().map(|error| format!("firmware: {error}")));
         }
         for module in modules {
             match module.run(&mut self.board_lines) {

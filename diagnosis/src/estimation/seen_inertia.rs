@@ -35,7 +35,7 @@ pub(crate) fn anchor(nominal: &mut Nominal, tracks: &[BlockedRecording], white: 
     nominal.kept_inertia = kept;
     nominal.anchor = match inertia {
         Inertia::Found(gain) => Some((gain, FOUND)),
-        Inertia::Hidden | Inertia::Foreign => None,
+        Inertia::Hidden | Inertia::TooHeavy => None,
     };
 }
 
@@ -47,7 +47,7 @@ enum Inertia {
     /// Nothing: the inertia found is next to nothing or negative.
     Hidden,
     /// Far more than the rig's: something else is wrong.
-    Foreign,
+    TooHeavy,
 }
 
 impl Inertia {
@@ -55,7 +55,7 @@ impl Inertia {
     fn of(found: f64, nominal: f64) -> Self {
         let by_rig = nominal / found;
         match by_rig {
-            _ if !by_rig.is_finite() || by_rig >= REACH => Self::Foreign,
+            _ if !by_rig.is_finite() || by_rig >= REACH => Self::TooHeavy,
             _ if by_rig <= REACH.recip() => Self::Hidden,
             _ => Self::Found(found),
         }
@@ -138,7 +138,7 @@ mod tests {
     #[test]
     fn a_gain_out_of_reach_is_no_anchor() {
         assert_eq!(Inertia::of(-30.0, -2.0), Inertia::Found(-30.0));
-        assert_eq!(Inertia::of(0.01, 2.0), Inertia::Foreign, "too heavy");
+        assert_eq!(Inertia::of(0.01, 2.0), Inertia::TooHeavy, "too heavy");
         assert_eq!(Inertia::of(100.0, 2.0), Inertia::Hidden, "too light");
         assert_eq!(Inertia::of(-3.0, 2.0), Inertia::Hidden, "of the wrong sign");
         assert_eq!(Inertia::of(f64::INFINITY, 2.0), Inertia::Hidden);
