@@ -31,6 +31,9 @@ impl EffectLaw for Defined {
 }
 
 impl EffectSearch for Defined {
+    fn needs_changing_command(&self) -> bool {
+        true
+    }
     fn has_optima_apart(&self) -> bool {
         true
     }

@@ -41,6 +41,9 @@ impl EffectLaw for Defined {
 }
 
 impl EffectSearch for Defined {
+    fn needs_changing_command(&self) -> bool {
+        true
+    }
     fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
         let limits: Vec<f64> = logarithmic(span.clip * span.command, 0.945 * span.command, 10);
         let hard = limits.iter().map(|&limit| Effect::shaped(name, &[("limit", limit)]));

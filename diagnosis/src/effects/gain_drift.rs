@@ -85,6 +85,9 @@ impl EffectLaw for Defined {
 }
 
 impl EffectSearch for Defined {
+    fn needs_changing_command(&self) -> bool {
+        true
+    }
     fn needs_inertia(&self) -> bool {
         true
     }

@@ -139,10 +139,6 @@ impl Smoothed {
         }
         let columns: Vec<&Vec<f64>> = columns.iter().collect();
         let factors = least_squares(&columns, force)?;
-        let variance = |column: &[f64]| {
-            let mean = column.iter().sum::<f64>() / column.len() as f64;
-            column.iter().map(|x| (x - mean).powi(2)).sum::<f64>()
-        };
         let of = |row: usize| columns.iter().zip(&factors).map(|(column, x)| column[row] * x).sum::<f64>();
         let left: Vec<f64> = force.iter().enumerate().map(|(row, f)| f - of(row)).collect();
         let all = variance(force);
@@ -152,17 +148,28 @@ impl Smoothed {
         is_enough.then_some(factors[0])
     }
 
-    /// True if the axis gives energy to its drive and would gain it by friction: a spring gives
-    /// back what it stored.
+    /// True if the axis gives energy to its drive and would gain it by friction, with an inertia
+    /// that beside a spring too is turned and shows: a spring gives back what it stored, and may be
+    /// most of the force.
     fn gains_by_friction(&self) -> bool {
         let constant = vec![1.0; self.force.len()];
         let columns = [&self.acceleration, &self.velocity, &self.direction, &constant, &self.position];
         least_squares(&columns, &self.force).is_some_and(|factors| {
             let rows = self.velocity.iter().zip(&self.direction);
             let work = self.force.iter().zip(&self.velocity).map(|(f, v)| (f - factors[3]) * v).sum::<f64>();
-            work < 0.0 && rows.map(|(v, sign)| (factors[1] * v + factors[2] * sign) * v).sum::<f64>() < 0.0
+            let by_acceleration = factors[0] * factors[0] * variance(&self.acceleration);
+            factors[0] < 0.0
+                && by_acceleration > BY_ACCELERATION * variance(&self.force)
+                && work < 0.0
+                && rows.map(|(v, sign)| (factors[1] * v + factors[2] * sign) * v).sum::<f64>() < 0.0
         })
     }
+}
+
+/// The sum of the squares of a column about its mean.
+fn variance(column: &[f64]) -> f64 {
+    let mean = column.iter().sum::<f64>() / column.len() as f64;
+    column.iter().map(|x| (x - mean).powi(2)).sum::<f64>()
 }
 
 /// The factors of columns whose sum is nearest to `y`; none where a column is zero.
@@ -254,7 +261,8 @@ const UNITS_OF_ANGLE: [UnitOfAngle; 4] = [
 /// rig's inertia if the angle is in another unit, and for an inertia that the rig's uncertainty
 /// excludes if it is not.
 pub(crate) fn unit_of_angle(all: &[&Recording], rig: &Rig) -> Option<String> {
-    let knows_inertia = 3.0 * (rig.inertia_sd() + rig.gain_sd()) < TAU.ln();
+    let unlikely = 3.0 * (rig.inertia_sd() + rig.gain_sd());
+    let knows_inertia = unlikely < TAU.ln();
     if rig.kind != Kind::Rotary
         || !knows_inertia
         || !rig.effects.is_empty()
@@ -263,10 +271,13 @@ pub(crate) fn unit_of_angle(all: &[&Recording], rig: &Rig) -> Option<String> {
         return None;
     }
     let smoothed: Vec<Smoothed> = all.iter().map(|recording| Smoothed::new(recording, rig)).collect();
+    let ratio_in = |one: &Smoothed, unit| one.inertia_in(unit).map(|inertia| inertia / rig.model.inertia);
+    if smoothed.iter().any(|one| ratio_in(one, 1.0).is_some_and(|ratio| ratio.ln().abs() < unlikely)) {
+        return None;
+    }
     let asks_for_it = |unit: &UnitOfAngle| {
         smoothed.iter().all(|one| {
-            let ratio = one.inertia_in(unit.radians).map(|inertia| inertia / rig.model.inertia);
-            ratio.is_some_and(|ratio| (1.0 / unit.right..unit.right).contains(&ratio))
+            ratio_in(one, unit.radians).is_some_and(|ratio| (1.0 / unit.right..unit.right).contains(&ratio))
         })
     };
     let unit = UNITS_OF_ANGLE.iter().find(|unit| asks_for_it(unit))?;
@@ -313,74 +324,4 @@ pub(crate) fn odd_one(all: &[&Recording], rig: &Rig) -> Option<(usize, String)> 
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    const RIG: &str = "format = 1\nkind = \"rotary\"\n[model]\ninertia = 2.0e-3\nviscous = 2.0e-3\n[actuator]\ngain = 1.0\n\
-                       command_unit = \"N·m\"\n[encoder]\ncounts_per_unit = 1.0e5\n";
-
-    /// A swing from 2 rad that dies out, and the torque that it takes against a spring of
-    /// `stiffness` N·m/rad.
-    fn swing(stiffness: f64) -> Recording {
-        let mut out = Recording { file: "fit.csv".into(), ..Recording::default() };
-        for row in 0..8000 {
-            let t = f64::from(row) * 1e-3;
-            let (height, (sine, cosine)) = (2.0 * (-0.3 * t).exp(), (3.0 * t).sin_cos());
-            let (fast_sine, fast_cosine) = (11.0 * t).sin_cos();
-            let position = height * cosine + 0.03 * fast_sine;
-            let velocity = -height * (0.3 * cosine + 3.0 * sine) + 0.33 * fast_cosine;
-            let acceleration = height * (1.8 * sine - 8.91 * cosine) - 3.63 * fast_sine;
-            out.time_s.push(t);
-            out.position_counts.push((position * 1e5).floor());
-            out.command.push(2.0e-3 * acceleration + 2.0e-3 * velocity + stiffness * position);
-        }
-        out
-    }
-
-    #[test]
-    fn a_measured_external_force_is_no_other_unit() {
-        let rig = Rig::parse(RIG, "rig.toml").expect("the rig is right");
-        let (usual, mut pushed) = (swing(0.0), swing(0.0));
-        // A tenth of the force by the drive, the rest by whoever pushes.
-        let pushes: Vec<f64> = pushed.command.iter().map(|u| 0.9 * u).collect();
-        pushed.command.iter_mut().for_each(|u| *u *= 0.1);
-        let all = [&usual, &usual, &pushed];
-        assert_eq!(odd_one(&all, &rig).map(|(place, _)| place), Some(2), "nothing is known of a push");
-        let measured = Recording { force: Some(pushes), ..pushed.clone() };
-        assert_eq!(odd_one(&[&usual, &usual, &measured], &rig), None);
-    }
-
-    #[test]
-    fn a_spring_that_gives_energy_back_is_no_turned_sign() {
-        let rig = Rig::parse(RIG, "rig.toml").expect("the rig is right");
-        assert_eq!(mistake(&swing(0.5), &rig), None);
-        let mut turned = swing(0.0);
-        turned.command.iter_mut().for_each(|u| *u = -*u);
-        let sentence = mistake(&turned, &rig).expect("its sign is wrong");
-        assert!(sentence.contains("a sign is wrong"), "{sentence}");
-    }
-
-    #[test]
-    fn an_angle_in_degrees_or_turns_is_a_wrong_unit() {
-        let right = Rig::parse(RIG, "rig.toml").expect("the rig is right");
-        let all = [swing(0.0), swing(0.0)];
-        let all: Vec<&Recording> = all.iter().collect();
-        assert_eq!(unit_of_angle(&all, &right), None);
-        for (factor, wanted) in [
-            (PI / 180.0, "multiply it by 57.2958"),
-            (180.0 / PI, "divide it by 57.2958"),
-            (TAU, "divide it by 6.28319"),
-            (1.0 / TAU, "multiply it by 6.28319"),
-        ] {
-            let mut rig = right.clone();
-            rig.encoder.counts_per_unit *= factor;
-            let sentence = unit_of_angle(&all, &rig).expect(wanted);
-            assert!(sentence.contains(wanted), "{sentence}");
-            rig.uncertainty.inertia = Some(3.0);
-            assert_eq!(unit_of_angle(&all, &rig), None, "nobody knows the inertia");
-        }
-        let mut heavier = right.clone();
-        heavier.model.inertia *= 3.0;
-        assert_eq!(unit_of_angle(&all, &heavier), None, "a wrong value is not a wrong unit");
-    }
-}
+mod tests;

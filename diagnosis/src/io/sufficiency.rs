@@ -22,10 +22,12 @@ const FEWEST_COUNTS: f64 = 100.0;
 /// The reason why recordings do not suffice for a verdict, if there is one; short recordings may
 /// suffice together although each is too short by itself.
 pub(crate) fn too_little(fit: &[Recording], holdout: &[Recording]) -> Option<String> {
-    if let Some(reason) = fit.iter().chain(holdout).find_map(alone) {
-        let enough = fit.iter().chain(holdout).filter(|recording| alone(recording).is_none());
+    let all: Vec<&Recording> = fit.iter().chain(holdout).collect();
+    let reason = |one: &&Recording| alone(one).or_else(|| of_constant_command(one, &all));
+    if let Some(first) = all.iter().find_map(reason) {
+        let enough = all.iter().filter(|one| reason(one).is_none());
         return Some(with_usable(
-            reason,
+            first,
             &enough.map(|recording| recording.file.as_str()).collect::<Vec<_>>(),
         ));
     }
@@ -67,16 +69,45 @@ fn alone(recording: &Recording) -> Option<String> {
             recording.len()
         ));
     }
-    let largest = recording.command.iter().fold(0.0_f64, |m, u| m.max(u.abs()));
-    // None at all is a free motion; one that never changes is distinguished from no offset.
-    if largest > 0.0 && spread(&recording.command) <= 1e-6 * largest {
-        return Some(format!("the command of {file} is constant; record one that changes"));
-    }
     // Longest gap: a hold of the last command over it would be a guess.
     let gap = recording.time_s.windows(2).map(|w| w[1] - w[0]).fold(0.0, f64::max);
     (gap > 0.25 * seconds).then(|| {
         format!("{file} has a gap of {gap:.2} s in its {seconds:.2} s; cut it into two recordings there")
     })
+}
+
+/// Part of the travel by which an axis comes back where it reverses.
+const BACK: f64 = 0.05;
+
+/// The reason why the constant command of a recording says nothing: no recording has another
+/// command, so that nothing distinguishes it from an offset, or the axis reverses more often than a
+/// constant force can make it. No command at all is a free motion.
+fn of_constant_command(recording: &Recording, all: &[&Recording]) -> Option<String> {
+    let first = *recording.command.first()?;
+    let is_same = |one: &Recording| one.command.iter().all(|u| (u - first).abs() <= 1e-6 * first.abs());
+    if first == 0.0 || !is_same(recording) {
+        return None;
+    }
+    let is_offset = all.iter().all(|one| is_same(one));
+    (is_offset || reversals(&recording.position_counts) > 1)
+        .then(|| format!("the command of {} is constant; record one that changes", recording.file))
+}
+
+/// The number of times that a position comes back by [`BACK`] of its travel.
+fn reversals(counts: &[f64]) -> usize {
+    let back = BACK * spread(counts);
+    let (mut count, mut way, mut farthest) = (0, 0.0, counts[0]);
+    for place in counts {
+        let ahead = if way == 0.0 { (place - farthest).abs() - back } else { way * (place - farthest) };
+        if way == 0.0 && ahead > 0.0 {
+            (way, farthest) = ((place - farthest).signum(), *place);
+        } else if way != 0.0 && ahead > 0.0 {
+            farthest = *place;
+        } else if way != 0.0 && ahead < -back {
+            (count, way, farthest) = (count + 1, -way, *place);
+        }
+    }
+    count
 }
 
 /// A sentence on a rate that is not read.
@@ -130,3 +161,40 @@ pub(crate) fn unusable(recording: &Recording, rig: &Rig) -> Option<String> {
 
 /// Travel over the farthest that the command can cause from which a unit is wrong.
 const IMPOSSIBLE: f64 = 30.0;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::TAU;
+
+    /// A second at 500 Hz under a constant command.
+    fn under(command: f64, place: fn(f64) -> f64) -> Recording {
+        let time_s: Vec<f64> = (0..500).map(|row| f64::from(row) * 2e-3).collect();
+        let position_counts = time_s.iter().map(|t| (1e4 * place(*t)).round()).collect();
+        let command = vec![command; time_s.len()];
+        Recording { file: "fit.csv".into(), time_s, position_counts, command, ..Recording::default() }
+    }
+
+    #[test]
+    fn constant_commands_that_differ_are_steps() {
+        // An axis that ran the other way first.
+        let all = [under(1.0, |t| t * t), under(-1.2, |t| 1.2 * t - t * t)];
+        let [one, other] = &all;
+        assert_eq!(of_constant_command(one, &[one, other]), None);
+        assert_eq!(of_constant_command(other, &[one, other]), None);
+        assert!(of_constant_command(one, &[one, one]).is_some(), "nothing distinguishes it from an offset");
+        let swings = under(1.0, |t| (4.0 * TAU * t).sin());
+        assert!(of_constant_command(&swings, &[&swings, other]).is_some(), "no constant force does that");
+        let free = under(0.0, |t| (4.0 * TAU * t).sin());
+        assert_eq!(of_constant_command(&free, &[&free, other]), None, "nothing drives a free motion");
+    }
+
+    #[test]
+    fn a_position_that_comes_back_reverses() {
+        let of = |place: fn(f64) -> f64| reversals(&under(0.0, place).position_counts);
+        assert_eq!(of(|t| t), 0);
+        assert_eq!(of(|t| t + 0.002 * (90.0 * t).sin()), 0, "a cogging motor runs on");
+        assert_eq!(of(|t| 1.2 * t - t * t), 1);
+        assert_eq!(of(|t| (2.0 * TAU * t).sin()), 4);
+    }
+}

@@ -55,6 +55,7 @@ pub(crate) fn span_of(tracks: &[BlockedRecording], nominal: &Nominal) -> Span {
         low: -fold(&|t| -t.motion.x.iter().copied().fold(f64::INFINITY, f64::min)),
         high: fold(&|t| t.motion.x.iter().copied().fold(f64::NEG_INFINITY, f64::max)),
         command,
+        command_changes: tracks.iter().any(|t| varies(t.rows.command.iter().map(|u| Some(*u)))),
         mean_square: tracks.iter().map(square).sum::<f64>() / seconds,
         duration: fold(&|t| t.rows.time.last().copied().unwrap_or(0.0)),
         row: seconds / rows,
@@ -130,7 +131,8 @@ fn has_stroke(span: &Span, nominal: &Nominal) -> bool {
 /// The shapes of an effect to start from; none where the recordings cannot show it or the rig holds
 /// it already. Periodic effects and missed counts are sought in a way of their own.
 pub(crate) fn shapes(name: N, span: &Span, nominal: &Nominal) -> Vec<Effect> {
-    if nominal.holds(name) || !is_seen(name, nominal) {
+    let stands_still = name.definition().needs_changing_command() && !span.command_changes;
+    if nominal.holds(name) || !is_seen(name, nominal) || stands_still {
         return Vec::new();
     }
     name.definition().grid(name, span)
@@ -262,6 +264,7 @@ mod tests {
             low: 0.0,
             high: 20.0,
             command: 1.0,
+            command_changes: true,
             duration: 50.0,
             row: 1e-3,
             block: 2.5e-3,
@@ -272,6 +275,18 @@ mod tests {
             force: false,
             rig: Believed::default(),
         }
+    }
+
+    #[test]
+    fn a_law_of_the_command_needs_one_that_changes() {
+        let rig = Rig::of_values(0.01, 0.0, 0.05);
+        let nominal = Nominal { is_balanced: true, ..Nominal::of(&rig) };
+        let sought = |command_changes| {
+            let span = Span { command_changes, ..span() };
+            let all = N::ALL.iter();
+            all.filter(|name| !shapes(**name, &span, &nominal).is_empty()).count()
+        };
+        assert_eq!(sought(true), sought(false) + 5, "deadband, clip, delay, lag and a gain that drifts");
     }
 
     #[test]

@@ -42,6 +42,9 @@ fn why(name: EffectName, span: &Span, nominal: &Nominal) -> Option<NotTested> {
     if !candidates::is_seen(name, nominal) {
         return Some(NotTested::InertiaHardlyMatters);
     }
+    if definition.needs_changing_command() && !span.command_changes {
+        return Some(NotTested::NoColumn("command"));
+    }
     if definition.is_periodic() {
         let travel = span.travel();
         return Some(match periodic::too_short_for(name, span, nominal)? {

@@ -16,8 +16,10 @@ pub(crate) struct Span {
     /// Travel relative to the start of each recording, rad or m.
     pub(crate) low: f64,
     pub(crate) high: f64,
-    /// Largest |command|, and the mean of its square over time.
+    /// Largest |command|, and whether it changes within any recording.
     pub(crate) command: f64,
+    pub(crate) command_changes: bool,
+    /// Mean square of the command over time.
     pub(crate) mean_square: f64,
     /// Longest recording, s.
     pub(crate) duration: f64,
@@ -138,6 +140,12 @@ pub(crate) trait EffectSearch {
     /// True if it does not show in motion whose inertia hardly matters: a joint, or the gain, which
     /// is then the scale of all else.
     fn needs_inertia(&self) -> bool {
+        false
+    }
+
+    /// True if it does not show where every recording has one command throughout: the drive's force
+    /// is any constant there, and a drift of it any force over the time.
+    fn needs_changing_command(&self) -> bool {
         false
     }
 
