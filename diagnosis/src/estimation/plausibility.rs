@@ -141,25 +141,25 @@ impl Smoothed {
         let factors = least_squares(&columns, force)?;
         let of = |row: usize| columns.iter().zip(&factors).map(|(column, x)| column[row] * x).sum::<f64>();
         let left: Vec<f64> = force.iter().enumerate().map(|(row, f)| f - of(row)).collect();
-        let all = variance(force);
-        let by_acceleration = factors[0] * factors[0] * variance(columns[0]);
+        let all = scatter(force);
+        let by_acceleration = factors[0] * factors[0] * scatter(columns[0]);
         let is_enough =
-            all > 0.0 && by_acceleration > BY_ACCELERATION * all && variance(&left) < (1.0 - EXPLAINED) * all;
+            all > 0.0 && by_acceleration > BY_ACCELERATION * all && scatter(&left) < (1.0 - EXPLAINED) * all;
         is_enough.then_some(factors[0])
     }
 
-    /// True if the axis gives energy to its drive and would gain it by friction, with an inertia
-    /// that beside a spring too is turned and shows: a spring gives back what it stored, and may be
-    /// most of the force.
+    /// True if the axis gives energy to its drive and would gain more by friction. A spring gives
+    /// back what it stored and may be most of the force, so the inertia has to be negative, and to
+    /// show, in a fit with a spring as well.
     fn gains_by_friction(&self) -> bool {
         let constant = vec![1.0; self.force.len()];
         let columns = [&self.acceleration, &self.velocity, &self.direction, &constant, &self.position];
         least_squares(&columns, &self.force).is_some_and(|factors| {
             let rows = self.velocity.iter().zip(&self.direction);
             let work = self.force.iter().zip(&self.velocity).map(|(f, v)| (f - factors[3]) * v).sum::<f64>();
-            let by_acceleration = factors[0] * factors[0] * variance(&self.acceleration);
+            let by_acceleration = factors[0] * factors[0] * scatter(&self.acceleration);
             factors[0] < 0.0
-                && by_acceleration > BY_ACCELERATION * variance(&self.force)
+                && by_acceleration > BY_ACCELERATION * scatter(&self.force)
                 && work < 0.0
                 && rows.map(|(v, sign)| (factors[1] * v + factors[2] * sign) * v).sum::<f64>() < 0.0
         })
@@ -167,7 +167,7 @@ impl Smoothed {
 }
 
 /// The sum of the squares of a column about its mean.
-fn variance(column: &[f64]) -> f64 {
+fn scatter(column: &[f64]) -> f64 {
     let mean = column.iter().sum::<f64>() / column.len() as f64;
     column.iter().map(|x| (x - mean).powi(2)).sum::<f64>()
 }

@@ -131,8 +131,7 @@ fn has_stroke(span: &Span, nominal: &Nominal) -> bool {
 /// The shapes of an effect to start from; none where the recordings cannot show it or the rig holds
 /// it already. Periodic effects and missed counts are sought in a way of their own.
 pub(crate) fn shapes(name: N, span: &Span, nominal: &Nominal) -> Vec<Effect> {
-    let stands_still = name.definition().needs_changing_command() && !span.command_changes;
-    if nominal.holds(name) || !is_seen(name, nominal) || stands_still {
+    if nominal.holds(name) || !is_seen(name, nominal) || needs_another_command(name, span) {
         return Vec::new();
     }
     name.definition().grid(name, span)
@@ -141,6 +140,11 @@ pub(crate) fn shapes(name: N, span: &Span, nominal: &Nominal) -> Vec<Effect> {
 /// True if an effect shows in such motion.
 pub(crate) fn is_seen(name: N, nominal: &Nominal) -> bool {
     nominal.virtual_inertia == 0.0 || !name.definition().needs_inertia()
+}
+
+/// True if only a command that changes would show an effect, and none does.
+pub(crate) fn needs_another_command(name: N, span: &Span) -> bool {
+    name.definition().needs_changing_command() && !span.command_changes
 }
 
 /// The shape values that refinement may move, with their bounds.

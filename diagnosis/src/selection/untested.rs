@@ -42,7 +42,7 @@ fn why(name: EffectName, span: &Span, nominal: &Nominal) -> Option<NotTested> {
     if !candidates::is_seen(name, nominal) {
         return Some(NotTested::InertiaHardlyMatters);
     }
-    if definition.needs_changing_command() && !span.command_changes {
+    if candidates::needs_another_command(name, span) {
         return Some(NotTested::NoColumn("command"));
     }
     if definition.is_periodic() {
