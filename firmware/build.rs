@@ -1,8 +1,10 @@
 //! Gives the linker the board's memory map and the scripts that lay the image out. Here and not in
 //! `.cargo/config.toml`, where a `RUSTFLAGS` of the environment would silently replace them.
-//! Refuses an image for no board or for two, as the HAL does in its own words.
+//! Refuses an image for no board or for two, as the HAL does in its own words. Gives every image the
+//! commit that it is built from, however it is built.
 
 use std::path::PathBuf;
+use std::process::Command;
 use std::{env, fs};
 
 /// The boards: the feature of each, as cargo hands it to this script, and the place of its memory
@@ -26,6 +28,7 @@ fn main() {
         );
         return;
     };
+    println!("cargo::rustc-env=NEEDLE_BUILD={}", commit());
     let out = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets OUT_DIR"));
     fs::copy(memory, out.join("memory.x")).expect("a board has a memory map");
     println!("cargo::rustc-link-search={}", out.display());
@@ -34,4 +37,27 @@ fn main() {
         println!("cargo::rustc-link-arg-tests={argument}");
     }
     println!("cargo::rustc-link-arg-tests=-Tembedded-test.x");
+}
+
+/// The commit as `link::build::Build` reads it: eight digits of its hash, with a `+` if the sources
+/// of the image differ from it; nothing outside a git checkout. The variable of the environment
+/// counts before the checkout.
+fn commit() -> String {
+    const SOURCES: [&str; 6] =
+        ["../control-core/src", "../link/src", "src", "Cargo.toml", "../Cargo.toml", "../Cargo.lock"];
+    println!("cargo::rerun-if-env-changed=NEEDLE_BUILD");
+    if let Ok(build) = env::var("NEEDLE_BUILD") {
+        return build;
+    }
+    let git = |arguments: &[&str]| {
+        let output = Command::new("git").args(arguments).output().ok().filter(|o| o.status.success())?;
+        Some(String::from_utf8_lossy(&output.stdout).trim().to_string())
+    };
+    let watched = ["HEAD", "index"].iter().filter_map(|file| git(&["rev-parse", "--git-path", file]));
+    for path in SOURCES.iter().map(ToString::to_string).chain(watched) {
+        println!("cargo::rerun-if-changed={path}");
+    }
+    let hash = git(&["rev-parse", "HEAD"]).unwrap_or_default();
+    let changed = git(&[&["status", "--porcelain", "--"], &SOURCES[..]].concat()).unwrap_or_default();
+    format!("{}{}", hash.get(..8).unwrap_or_default(), if changed.is_empty() { "" } else { "+" })
 }

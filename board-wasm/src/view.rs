@@ -148,10 +148,11 @@ impl View {
                 self.fault = Some(cause.to_string());
                 format!("fault: {cause}")
             }
-            EventKind::Started => {
+            EventKind::Cleared => {
                 (self.fault, self.crash) = (None, None);
-                "torque on".into()
+                "fault cleared".into()
             }
+            EventKind::Started => "torque on".into(),
             EventKind::Stopped => "torque off".into(),
             EventKind::Contact { layer } => format!("contact with layer {}", u16::from(layer) + 1),
             EventKind::Puncture { layer } => format!("puncture of layer {}", u16::from(layer) + 1),

@@ -109,13 +109,17 @@ impl Core {
         &self.plan
     }
 
+    fn is_powered(&self) -> bool {
+        self.mode.is_powered()
+    }
+
     fn heat(&self) -> u32 {
         self.winding.heat()
     }
 
     fn order(&mut self, segments: &mut Segments, order: Order) {
         match order {
-            Order::Start if !self.mode.is_powered() && self.plan.device().commissioned => {
+            Order::Start if self.mode == Mode::Idle && self.plan.device().commissioned => {
                 self.insertion.begin();
                 self.power_up(Mode::Running, true);
             }
@@ -128,10 +132,11 @@ impl Core {
                 self.withdraw();
                 self.speed = SpeedEstimator::new(self.plan.config.device.speed, Counts(0));
             }
+            Order::Clear if self.mode == Mode::Faulted => self.mode = Mode::Idle,
             Order::Heartbeat => self.heartbeat(),
             Order::Trip(fault) => self.trip(fault),
             Order::Compensate(gains) => self.feedforward.set_gains(gains),
-            Order::Start | Order::Stop | Order::Zero => {}
+            Order::Start | Order::Stop | Order::Zero | Order::Clear => {}
         }
     }
 
@@ -141,6 +146,7 @@ impl Core {
         }
         let depth = self.plan.scale.depth(self.latest_count());
         let is_commissioned = self.plan.device().commissioned;
+        let may_play = self.mode == Mode::Idle;
         match order {
             LargeOrder::Configure(plan) => {
                 self.speed = SpeedEstimator::new(plan.config.device.speed, self.latest_count());
@@ -149,11 +155,11 @@ impl Core {
                 self.withdraw();
                 self.winding.allow(&self.plan.thermal, self.plan.torque_limits.torque);
             }
-            LargeOrder::Excite(ref excitation) if is_commissioned || excitation.is_gentle() => {
+            LargeOrder::Excite(ref excitation) if may_play && (is_commissioned || excitation.is_gentle()) => {
                 self.player.begin_one(segments, excitation, depth);
                 self.play(excitation.compensated);
             }
-            LargeOrder::Play(ref sequence) if is_commissioned && !sequence.is_empty() => {
+            LargeOrder::Play(ref sequence) if may_play && is_commissioned && !sequence.is_empty() => {
                 self.player.begin(segments, sequence, depth);
                 self.play(sequence.is_compensated());
             }

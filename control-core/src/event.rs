@@ -41,7 +41,7 @@ impl State {
     }
 }
 
-/// Why torque was taken away. It latches: a person has to start again.
+/// Why torque was taken away. It latches: a person has to clear it before the device starts again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[repr(u8)]
 pub enum Fault {

@@ -86,11 +86,14 @@ impl Supervisor {
     }
 }
 
-/// Faults that tasks below the tick have found, on their way to it: a bit each.
+/// What takes torque away at the next tick, on its way there from the tasks below it: a bit for
+/// each fault, and one for a stop.
 #[derive(Default)]
 pub struct Trips(AtomicU32);
 
-const _: () = assert!(Fault::ALL.len() <= 32, "a bit each");
+/// The bit of a stop.
+const STOP: u32 = 1 << 31;
+const _: () = assert!(Fault::ALL.len() <= 31, "a bit each");
 
 impl Trips {
     /// None.
@@ -103,15 +106,25 @@ impl Trips {
         self.0.fetch_or(1 << fault as u16, Relaxed);
     }
 
-    /// True if any waits; cheap, for the tick.
+    /// Asks the tick to stop.
+    pub fn raise_stop(&self) {
+        self.0.fetch_or(STOP, Relaxed);
+    }
+
+    /// True if nothing waits; cheap, for the tick.
     pub fn is_empty(&self) -> bool {
         self.0.load(Relaxed) == 0
     }
 
-    /// The fault with the lowest number; the others of the same moment follow from it and are
+    /// Takes the stop; true if there was one.
+    pub fn take_stop(&self) -> bool {
+        self.0.fetch_and(!STOP, Relaxed) & STOP != 0
+    }
+
+    /// Takes the fault with the lowest number; the others of the same moment follow from it and are
     /// forgotten.
     pub fn take(&self) -> Option<Fault> {
-        let raised = self.0.swap(0, Relaxed);
+        let raised = self.0.fetch_and(STOP, Relaxed);
         Fault::ALL.get(raised.trailing_zeros() as usize).copied()
     }
 }

@@ -27,6 +27,7 @@ export function words(event, layers) {
     case "exit": return capital(t("event.exit", { name }));
     case "fault": return t("event.fault", { cause: said(event.cause) });
     case "not_saved": return capital(said(event.cause));
+    case "cleared": return t("event.cleared");
     case "started": return t("event.started");
     case "stopped": return t("event.stopped");
     default: return null; // limits have lamps

@@ -39,7 +39,8 @@ export class Hand {
     // A button that was clicked, not pressed by a key, gives the focus back, so that Space stops again.
     document.addEventListener("click", (event) => event.detail > 0 && event.target.closest?.("button")?.blur());
     document.getElementById("stop").addEventListener("click", () => this.stop());
-    document.getElementById("start").addEventListener("click", () => link.send({ do: "start" }));
+    this.faulted = false;
+    document.getElementById("start").addEventListener("click", () => link.send({ do: this.faulted ? "clear" : "start" }));
     this.zero = document.getElementById("zero");
     this.zero.addEventListener("click", () => this.setZero());
     this.angle = document.getElementById("angle");
@@ -62,15 +63,24 @@ export class Hand {
     this.canvas.setAttribute("aria-valuemin", String(DRAWN_BACK_MM));
     this.canvas.setAttribute("aria-valuemax", this.deepest.toFixed(0));
     this.demo.hidden = !this.movable;
-    this.nameButtons(this.source === "recording");
+    this.nameButtons();
     this.say();
   }
 
+  /** While a fault is latched, Start clears it first: the person has looked at the device. */
+  followFault(fault) {
+    if (this.faulted === Boolean(fault)) return;
+    this.faulted = Boolean(fault);
+    this.nameButtons();
+  }
+
   /** A recording has no torque: the same two buttons play and pause it. */
-  nameButtons(recording) {
+  nameButtons() {
     const [start, stop] = [document.getElementById("start"), document.getElementById("stop")];
-    start.textContent = t(recording ? "start.play" : "start.start");
-    start.title = t(recording ? "start.play_title" : "start.title");
+    const recording = this.source === "recording";
+    const what = recording ? "play" : this.faulted ? "clear" : "start";
+    start.textContent = t(`start.${what}`);
+    start.title = t(what === "start" ? "start.title" : `start.${what}_title`);
     stop.firstChild.data = t(recording ? "stop.pause" : "stop.stop");
     stop.title = t(recording ? "stop.pause_title" : "stop.title");
   }

@@ -4,7 +4,7 @@ import { BodyView } from "./body.js";
 import { colours } from "./canvas.js";
 import { EventList } from "./events.js";
 import { Hand } from "./hand.js";
-import { begin, t, tissueName } from "./language.js";
+import { begin, said, t, tissueName } from "./language.js";
 import { Link } from "./link.js";
 import { Panel } from "./panel.js";
 import { PatientEditor } from "./patient.js";
@@ -78,6 +78,7 @@ const receive = {
     linkStatus = message.link;
     scrub.follow(linkStatus.replay);
     compensationSlider.follow(linkStatus.compensation);
+    hand.followFault(linkStatus.fault);
     practice.follow(linkStatus);
     const jumped = linkStatus.replay && linkStatus.replay.jumps !== jumps;
     if (jumped) {
@@ -204,7 +205,7 @@ function tellCondition(condition) {
   else if (condition === "lost") {
     panel.banner((seconds < 2 ? t("banner.lost") : t("banner.unreachable", { since })) + owed);
   } else if (condition === "stale") panel.banner(t("banner.silent", { since }) + (notice ? ` ${notice}.` : ""));
-  else panel.banner(notice);
+  else panel.banner(notice || (linkStatus?.fault ? t("banner.fault", { cause: said(linkStatus.fault) }) : ""));
 }
 
 function count(nowMs) {

@@ -1,9 +1,10 @@
 //! The commit that a program was built from, so that a recording or a report says which one made
 //! it.
 //!
-//! `cargo xtask dist` names it in the variable `NEEDLE_BUILD`: eight hexadecimal digits, with a `+`
-//! behind them if the sources had been changed since. Without that variable the commit is unknown,
-//! and nothing is built anew for each commit.
+//! It is named in the variable `NEEDLE_BUILD`: eight hexadecimal digits, with a `+` behind them if
+//! the sources had been changed since. `firmware/build.rs` sets it for every image, `cargo xtask
+//! dist` for the programs that it makes; elsewhere the commit is unknown, and nothing is built anew
+//! for each commit.
 
 use core::fmt;
 use serde::{Deserialize, Serialize};
@@ -25,7 +26,7 @@ impl Build {
     };
 
     /// Reads `text`; anything but eight hexadecimal digits and a `+` is an unknown commit.
-    const fn parse(text: &str) -> Self {
+    pub const fn parse(text: &str) -> Self {
         const UNKNOWN: Build = Build { commit: 0, is_changed: false };
         let (mut commit, mut digits, mut is_changed) = (0_u32, 0, false);
         let mut rest = text.as_bytes();

@@ -18,7 +18,7 @@ use control_core::ceilings::Ceilings;
 use control_core::config::Tissue;
 use control_core::event::{Fault, Limits};
 use control_core::interlock::Interlocks;
-use control_core::{AnyOrder, Plan, TICK_HZ, TickOutput};
+use control_core::{AnyOrder, Order, Plan, TICK_HZ, TickOutput};
 use core::borrow::BorrowMut;
 use heapless::HistoryBuf;
 pub use upload::LATE_TICKS;
@@ -39,13 +39,25 @@ pub struct Identity {
     pub serial: [u8; 12],
     /// Version of the firmware.
     pub firmware: [u8; 3],
+    /// The commit that it was built from.
+    pub build: Build,
     /// The ceilings that no command raises.
     pub ceilings: Ceilings,
 }
 
 impl Identity {
     /// The identity of every virtual device.
-    pub const VIRTUAL: Self = Self { serial: [0; 12], firmware: [0, 1, 0], ceilings: Ceilings::VIRTUAL };
+    pub const VIRTUAL: Self =
+        Self { serial: [0; 12], firmware: [0, 1, 0], build: Build::CURRENT, ceilings: Ceilings::VIRTUAL };
+}
+
+/// What the control law has done beyond the samples that have arrived.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Ahead {
+    /// The amplifier is on right now.
+    pub is_on: bool,
+    /// An order that gives torque has been passed on, is still valid and has not been carried out.
+    pub start_waits: bool,
 }
 
 /// The device's end of the link.
@@ -58,6 +70,13 @@ pub struct Endpoint<W = Waiting> {
     in_session: bool,
     powered: bool,
     start_ordered: bool,
+    /// See [`Endpoint::set_ahead`].
+    ahead: Ahead,
+    /// The id of the session's last stop.
+    last_stop: Option<u32>,
+    stop_due: bool,
+    /// True if a stop has come since the fault.
+    stopped_since_fault: bool,
     /// The sequence that waits for [`crate::Command::Play`].
     upload: Upload,
     /// The latest tick.
@@ -81,7 +100,7 @@ pub struct Endpoint<W = Waiting> {
 
 impl Endpoint {
     /// `plan` is the one that the control law starts with; `reset_cause` is reported until a person
-    /// starts again.
+    /// clears it.
     pub fn new(identity: Identity, plan: &Plan, reset_cause: Option<Fault>) -> Self {
         Self::with(Waiting::new(), identity, plan, reset_cause)
     }
@@ -99,6 +118,10 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
             in_session: false,
             powered: false,
             start_ordered: false,
+            ahead: Ahead::default(),
+            last_stop: None,
+            stop_due: false,
+            stopped_since_fault: false,
             upload: Upload::NOTHING,
             now: 0,
             zeroed: false,
@@ -134,19 +157,19 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
         }
     }
 
-    /// The next order for the control law.
+    /// The next order for the control law, a stop before all others.
     pub fn next_order(&mut self) -> Option<AnyOrder> {
+        if self.take_stop() {
+            return Some(Order::Stop.into());
+        }
         self.waiting.borrow_mut().orders.pop_front()
     }
 
-    /// The PC is gone: nothing waits for it any longer, and what it asked for and was not yet done
-    /// is forgotten.
+    /// The PC is gone: nothing waits for it any longer, and what it asked for gives no torque any
+    /// more.
     pub fn disconnect(&mut self) {
         self.in_session = false;
-        self.start_ordered = false;
-        self.proof.interrupt();
-        self.upload.forget();
-        self.waiting.borrow_mut().orders.clear();
+        self.drop_starts();
         self.decoder = Decoder::default();
         self.forget_waiting();
     }
@@ -156,7 +179,7 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
         self.in_session
     }
 
-    /// The fault that has latched, or that ended the last run, until a person starts the device.
+    /// The fault that has latched, or that ended the last run, until a person clears it.
     pub fn fault(&self) -> Option<Fault> {
         self.fault
     }
@@ -166,10 +189,23 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
         self.interlocks = interlocks;
     }
 
-    /// Sets the crash that ended the last run, to be sent after each hello until a person starts
-    /// the device.
+    /// Sets the crash that ended the last run, to be sent after each hello until a person clears
+    /// the fault.
     pub fn set_crash(&mut self, crash: Option<Crash>) {
         self.crash = crash;
+    }
+
+    /// Says what the control law has done beyond the samples that have arrived, from now on. Where
+    /// nothing lies between the two there is nothing to say.
+    pub fn set_ahead(&mut self, ahead: Ahead) {
+        self.ahead = ahead;
+    }
+
+    /// Returns true once after each stop, for whoever has a faster way to the control law than
+    /// [`Self::next_order`]: a stop overtakes every order, and those before it give no torque any
+    /// more.
+    pub fn take_stop(&mut self) -> bool {
+        core::mem::take(&mut self.stop_due)
     }
 
     /// The configuration in force was not saved.
@@ -277,7 +313,7 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
             version: PROTOCOL_VERSION,
             identity: self.identity.serial,
             firmware: self.identity.firmware,
-            build: Build::CURRENT,
+            build: self.identity.build,
             config_hash: codec::hash(plan.config()),
             device_hash: codec::hash(device),
             tick_hz: TICK_HZ,
@@ -295,9 +331,11 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
     }
 
     fn note_events(&mut self, tick: u64, output: &TickOutput) {
+        if !self.ahead.start_waits && self.waiting.borrow().orders.is_empty() {
+            self.start_ordered = false;
+        }
         if output.enable != self.powered {
             self.powered = output.enable;
-            self.start_ordered = false;
             match (output.enable, output.tripped) {
                 (true, _) => self.event(tick, EventKind::Started),
                 (false, None) => self.event(tick, EventKind::Stopped),
@@ -306,7 +344,7 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
         }
         if let Some(cause) = output.tripped {
             self.fault = Some(cause);
-            self.start_ordered = false;
+            self.stopped_since_fault = false;
             self.upload.forget();
             self.event(tick, EventKind::Fault { cause });
         }

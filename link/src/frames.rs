@@ -17,7 +17,7 @@ use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
 /// Version of what follows; a PC refuses another.
-pub const PROTOCOL_VERSION: u16 = 9;
+pub const PROTOCOL_VERSION: u16 = 10;
 /// Samples in a full block: 3.2 ms.
 pub const BLOCK_SAMPLES: usize = 32;
 /// Pose frames a second.
@@ -53,7 +53,7 @@ pub enum DeviceFrame {
     /// The device's part of the configuration in force; the answer to [`Command::ReportDevice`].
     Device(Record),
     /// The crash that ended the device's last run, after the hello of each session until a person
-    /// starts it.
+    /// clears the fault.
     Crash(Crash),
 }
 
@@ -84,7 +84,8 @@ pub struct Hello {
     pub full_scale_torque: MillinewtonMetres,
     /// The converter.
     pub dac: DacWidth,
-    /// The fault that has latched, or the cause of the last reset where it was one.
+    /// The fault that has latched, or the cause of the last reset where it was one, until a person
+    /// clears it.
     pub fault: Option<Fault>,
 }
 
@@ -167,6 +168,8 @@ pub enum EventKind {
         /// Which layer.
         layer: u8,
     },
+    /// A person has cleared the latched fault: the device may be started again.
+    Cleared,
 }
 
 /// The reason why a configuration was not saved.
@@ -269,6 +272,12 @@ pub enum CommandRefusal {
     NotShown,
     /// A sequence, or one of its segments, is not taken; what was uploaded is forgotten.
     Sequence(SequenceRefusal),
+    /// A fault has latched, or has ended the last run: a person has to clear it first.
+    Faulted(Fault),
+    /// A fault is cleared only after a stop.
+    NotStopped,
+    /// A stop with a later number has overtaken it: it gives no torque any more.
+    Overtaken,
 }
 
 impl core::fmt::Display for CommandRefusal {
@@ -291,6 +300,11 @@ impl core::fmt::Display for CommandRefusal {
                 "the device was not commissioned with this configuration, and its own pulses have not shown that motor and encoder match; run host-sim commission",
             ),
             CommandRefusal::Sequence(refusal) => refusal.fmt(f),
+            CommandRefusal::Faulted(fault) => {
+                write!(f, "{fault}; look at the device, then clear the fault and start again")
+            }
+            CommandRefusal::NotStopped => f.write_str("a fault is cleared only after a stop; stop the device first"),
+            CommandRefusal::Overtaken => f.write_str("a stop came after this start was asked for; start again"),
         }
     }
 }
@@ -298,7 +312,9 @@ impl core::fmt::Display for CommandRefusal {
 /// PC to device.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct HostFrame {
-    /// Another one for each command; a repeated id is answered again and not carried out again.
+    /// Another one for each command, each later than the one before it, from a hello on; a repeated
+    /// id is answered again and not carried out again. A command that gives torque is refused where
+    /// its id is not later than that of the last stop.
     pub id: u32,
     /// The command.
     pub command: Command,
@@ -317,9 +333,10 @@ pub enum Command {
     /// Whom the needle goes into from now on; taken whole or refused with the reason, and only
     /// while torque is off. What was found at commissioning stays as it is.
     ConfigurePatient(Patient),
-    /// Power up and fade in.
+    /// Power up and fade in; not while a fault is latched.
     Start,
-    /// Torque off.
+    /// Torque off. It waits for nothing, and nothing that was asked for before it gives torque any
+    /// more.
     Stop,
     /// The needle is at depth 0 now; only while torque is off.
     Zero,
@@ -365,4 +382,6 @@ pub enum Command {
         /// [`crate::codec::hash`] of the segments, as a slice.
         checksum: u32,
     },
+    /// A person has seen the fault that is latched; only after a stop that came after the fault.
+    Clear,
 }

@@ -14,7 +14,7 @@ use link::frames::{Command, CommandRefusal, DeviceFrame, PROTOCOL_VERSION};
 use link::host::{Commands, Reception};
 
 const IDENTITY: Identity =
-    Identity { serial: [7; 12], firmware: [1, 2, 3], ceilings: Ceilings::new(40, 600) };
+    Identity { serial: [7; 12], firmware: [1, 2, 3], ceilings: Ceilings::new(40, 600), ..Identity::VIRTUAL };
 
 /// A device on a roller of 15 g·cm² with 0.5 mN·m of dry friction.
 struct Bench {

@@ -162,7 +162,9 @@ impl Bench {
         acks.next_back().expect("every command is answered")
     }
 
-    fn run(&mut self, ticks: u64, mut count: impl FnMut(u64) -> i32) {
+    /// Returns the number of ticks with torque.
+    fn run(&mut self, ticks: u64, mut count: impl FnMut(u64) -> i32) -> u64 {
+        let mut powered = 0;
         for _ in 0..ticks {
             while let Some(order) = self.device.next_order() {
                 self.controller.order(order);
@@ -172,7 +174,9 @@ impl Bench {
             let output = self.controller.tick(input);
             self.device.record(self.tick, &output);
             self.tick += 1;
+            powered += u64::from(output.enable);
         }
+        powered
     }
 
     fn drain(&mut self) -> Vec<DeviceFrame> {
@@ -313,4 +317,40 @@ fn a_fault_is_reported_and_again_after_a_reconnection() {
     bench.device.receive(&hello);
     let frames = bench.drain();
     assert!(matches!(&frames[0], DeviceFrame::Hello(h) if h.fault == Some(Fault::EncoderJump)), "{frames:?}");
+}
+
+#[test]
+fn a_fault_is_cleared_by_a_person_after_a_stop_and_by_nothing_else() {
+    let mut bench = Bench::new();
+    let _ = bench.send(Command::Hello { version: PROTOCOL_VERSION });
+    assert_eq!(bench.send(Command::Clear), Ok(()), "there is none");
+    let _ = bench.send(Command::Stop);
+    assert_eq!(bench.send(Command::Start), Ok(()));
+    bench.run(10, |tick| if tick > 5 { 5_000 } else { 0 });
+    let refused = Err(CommandRefusal::Faulted(Fault::EncoderJump));
+    assert_eq!(bench.send(Command::Start), refused);
+    assert_eq!(bench.send(Command::Clear), Err(CommandRefusal::NotStopped), "the stop was before it");
+    let _ = bench.send(Command::Stop);
+    assert_eq!(bench.send(Command::Start), refused, "a stop alone clears nothing");
+    let clear = bench.bytes(Command::Clear);
+    bench.device.receive(&clear);
+    let is_cleared = |f: &DeviceFrame| matches!(f, DeviceFrame::Event(e) if e.kind == EventKind::Cleared);
+    assert!(bench.drain().iter().any(is_cleared));
+    bench.run(2, |_| 0);
+    assert_eq!(bench.send(Command::Start), Ok(()));
+    assert_eq!(bench.run(10, |_| 0), 10, "torque");
+}
+
+#[test]
+fn a_start_that_a_stop_has_overtaken_gives_no_torque() {
+    let mut bench = Bench::new();
+    let _ = bench.send(Command::Hello { version: PROTOCOL_VERSION });
+    let late = bench.bytes(Command::Start);
+    assert_eq!(bench.send(Command::Stop), Ok(()));
+    bench.device.receive(&late);
+    let is_refused =
+        |f: &DeviceFrame| matches!(f, DeviceFrame::Ack(ack) if ack.result == Err(CommandRefusal::Overtaken));
+    assert!(bench.drain().iter().any(is_refused));
+    assert_eq!(bench.run(10, |_| 0), 0);
+    assert_eq!(bench.send(Command::Start), Ok(()));
 }

@@ -204,6 +204,8 @@ fn a_sequence_is_forgotten_at_all_that_comes_between() {
         ("a fault", |bench| {
             bench.controller.order(Order::Trip(Fault::Tilt));
             bench.run(1);
+            bench.must(Command::Stop);
+            bench.must(Command::Clear);
         }),
         ("another configuration", |bench| {
             bench.must(Command::ConfigureDevice(Device::commissioned_virtual()));

@@ -88,6 +88,7 @@ impl Simulation {
                 self.person_starts = true;
                 self.driver.stop();
             }
+            Control::Clear => self.driver.clear(),
             Control::Zero => self.driver.zero(),
             other => self.device.control(other),
         }
@@ -103,6 +104,7 @@ impl Simulation {
             status.samples = counts.samples;
             status.lost_samples = counts.lost_samples;
             status.garbage = counts.garbage;
+            status.fault = self.driver.fault().map(|fault| fault.to_string());
             status.notice = self.driver.notice().map(str::to_owned);
         });
     }

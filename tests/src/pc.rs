@@ -149,14 +149,21 @@ impl Pc {
         self.command(board, command).result.expect_err("the device refuses")
     }
 
-    /// Sends a command that the device has to carry out. Where it does not know its depth when it
-    /// is to start, the tip is on the skin now, as a person says who is told so.
+    /// Sends a command that the device has to carry out. Where a fault is latched, or the device
+    /// does not know its depth when it is to start, a person who is told so clears the fault, and
+    /// says that the tip is on the skin now.
     ///
     /// # Panics
     ///
     /// When it refuses or does not answer.
     pub fn must(&mut self, board: &mut Board, command: Command) {
         let mut ack = self.command(board, command.clone());
+        if let Err(CommandRefusal::Faulted(_)) = ack.result {
+            for clear in [Command::Stop, Command::Clear] {
+                assert_eq!(self.command(board, clear).result, Ok(()), "the fault is cleared");
+            }
+            ack = self.command(board, command.clone());
+        }
         if ack.result == Err(CommandRefusal::Interlocked(Interlock::NotZeroed)) {
             assert_eq!(self.command(board, Command::Zero).result, Ok(()), "the device refuses a zero");
             ack = self.command(board, command);

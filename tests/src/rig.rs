@@ -2,7 +2,7 @@
 
 use control_core::event::Fault;
 use link::Command;
-use link::frames::EventKind;
+use link::frames::{CommandRefusal, EventKind};
 
 use crate::board::processor::FIRST_EXTERNAL;
 use crate::board::{Board, Drive, Effect, MILLISECOND, Nanos, PlantSide, Wiring, plant};
@@ -202,6 +202,8 @@ impl Rig {
             self.pc.run_ms(&mut self.board, 200);
         }
         let start = self.board.now();
+        let refused = self.pc.must_not(&mut self.board, Command::Start);
+        assert_eq!(refused, CommandRefusal::Faulted(cause), "nobody has cleared it");
         self.pc.must(&mut self.board, Command::Start);
         self.pc.run_ms(&mut self.board, 500);
         assert!(self.pc.heard_event(|kind| *kind == EventKind::Started), "a person starts it again");

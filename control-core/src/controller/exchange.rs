@@ -63,7 +63,7 @@ pub struct Sample {
 /// An order of a person or the supervisor to the control law, between ticks, in a few bytes.
 #[derive(Clone, Copy, Debug)]
 pub enum Order {
-    /// Power up and fade in; clears a latched fault. Only on a device that has been commissioned.
+    /// Power up and fade in. Only on a device that has been commissioned and has no latched fault.
     Start,
     /// Zero torque, amplifier off.
     Stop,
@@ -71,6 +71,8 @@ pub enum Order {
     Zero,
     /// The PC is alive.
     Heartbeat,
+    /// A person has seen the latched fault: it no longer keeps the device from being started.
+    Clear,
     /// Something outside the tick went wrong: torque off, latched.
     Trip(Fault),
     /// The gains of the compensation from now on, until the next [`LargeOrder::Configure`]; they
@@ -103,6 +105,13 @@ pub enum AnyOrder {
     Small(Order),
     /// One that takes more memory.
     Large(LargeOrder),
+}
+
+impl AnyOrder {
+    /// True if it turns the amplifier on.
+    pub fn gives_torque(&self) -> bool {
+        matches!(self, Self::Small(Order::Start) | Self::Large(LargeOrder::Excite(_) | LargeOrder::Play(_)))
+    }
 }
 
 impl From<Order> for AnyOrder {

@@ -38,6 +38,11 @@ impl<S: BorrowMut<Segments>> Controller<S> {
         self.core.plan()
     }
 
+    /// True if the amplifier is on from the next tick on, unless that trips.
+    pub fn is_powered(&self) -> bool {
+        self.core.is_powered()
+    }
+
     /// The winding's heat in (mN·m)², in Q16: what must not be forgotten in a reset.
     pub fn heat(&self) -> u32 {
         self.core.heat()

@@ -249,6 +249,7 @@ fn gains_change_without_a_step_and_a_fault_ends_feedforward() {
     let output = tick(&mut controller, 0, 1_571);
     assert_eq!((output.enable, output.dac.0), (false, 2_048), "off in the same tick");
     // A person starts it again: from nothing.
+    controller.order(Order::Clear);
     controller.order(Order::Start);
     let first = code_after(&mut controller, 100, 0, 1_571);
     assert!(first.abs() < all.abs() / 10, "{first} after 10 ms");

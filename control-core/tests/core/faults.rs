@@ -37,6 +37,7 @@ fn every_fault_takes_torque_away_within_the_tick_and_latches() {
     let tripped = silent.filter_map(|o| o.tripped.map(|f| (f, o.enable, o.dac))).collect::<Vec<_>>();
     assert_eq!(tripped, [(Fault::HostSilent, false, zero)]);
 
+    c.order(Order::Clear);
     c.order(Order::Start);
     let again = tick_at(&mut c, deep);
     assert!(again.enable);
@@ -82,6 +83,7 @@ fn no_count_under_torque_is_a_dead_encoder_but_rest_is_not() {
     let trips = dead(&mut c);
     assert!(matches!(trips[..], [(40_490..=40_520, Fault::EncoderFrozen)]), "{trips:?}");
     // Lines at one level may be without power: 50 ms are long then.
+    c.order(Order::Clear);
     c.order(Order::Start);
     c.set_lines_agree(true);
     let trips = dead(&mut c);

@@ -5,7 +5,7 @@ use control_core::config::DacWidth;
 use control_core::event::{Fault, Limits, State};
 use control_core::excitation::{Excitation, Servo, Signal};
 use control_core::units::{Counts, Damping, Millimetres, MillinewtonMetres, Milliradians, Stiffness};
-use control_core::{Config, Controller, LargeOrder, Order, Plan, TickInput, TickOutput};
+use control_core::{AnyOrder, Config, Controller, LargeOrder, Order, Plan, TickInput, TickOutput};
 use fixed::types::{I8F24, I16F16};
 
 /// A needle straight into the skin: lengths along it are depths.
@@ -77,7 +77,7 @@ fn an_uncommissioned_device_plays_only_gentle_excitations() {
 }
 
 #[test]
-fn a_stop_takes_torque_away_and_does_not_clear_a_fault() {
+fn a_fault_stays_latched_until_it_is_cleared() {
     let mut c = started_at(0);
     c.order(Order::Stop);
     let output = tick(&mut c, 0);
@@ -88,8 +88,16 @@ fn a_stop_takes_torque_away_and_does_not_clear_a_fault() {
     c.order(Order::Stop);
     let output = tick(&mut c, 0);
     assert_eq!((output.enable, state(&output)), (false, Some(State::Fault)));
+    for order in [LargeOrder::Excite(ramps(50)).into(), AnyOrder::from(Order::Start)] {
+        c.order(order);
+        assert!(!tick(&mut c, 0).enable, "neither a stop nor a start clears it");
+    }
+    c.order(Order::Clear);
+    assert_eq!(state(&tick(&mut c, 0)), Some(State::Idle));
     c.order(Order::Start);
-    assert!(tick(&mut c, 0).enable, "only a start does");
+    assert!(tick(&mut c, 0).enable);
+    c.order(Order::Clear);
+    assert!(tick(&mut c, 0).enable, "without a fault there is nothing to clear");
 }
 
 #[test]

@@ -250,6 +250,7 @@ fn nothing_is_left_of_a_sequence_that_was_cut_short() {
                 assert_eq!(State::from_code(output.sample.state), Some(state));
             }
             // A start is a needle's, not the rest of a sequence.
+            c.order(Order::Clear);
             c.order(Order::Start);
             let output = tick(&mut c, 0);
             assert!(output.enable && !plays(&output));

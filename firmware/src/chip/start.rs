@@ -22,6 +22,7 @@ use firmware::reset::{Crash, ResetFlags, Said, cause};
 use firmware::store::{Nor, Store, Stored};
 use firmware::tasks::tick::BoardDrive;
 use firmware::timing;
+use link::build::Build;
 use link::device::Identity;
 use stm32f4xx_hal::gpio::{PA11, PA12};
 use stm32f4xx_hal::otg_fs::USB;
@@ -170,7 +171,12 @@ impl<W: Wiring> Parts<W> {
             store,
             plan,
             heat,
-            identity: Identity { serial: serial_number(), firmware: version(), ceilings },
+            identity: Identity {
+                serial: serial_number(),
+                firmware: version(),
+                build: Build::parse(env!("NEEDLE_BUILD")),
+                ceilings,
+            },
             reset_cause,
             crash,
         }

@@ -15,8 +15,8 @@ pub type Packet = Vec<u8, PACKET_BYTES>;
 /// An order on its way to the tick in a few bytes, which a tick moves without noticing.
 #[derive(Clone, Copy)]
 pub struct Queued {
-    /// The number of the session that it is from: only the PC that is there now is given torque.
-    pub session: u8,
+    /// The number of stops that had come before it: after a later one it gives no torque.
+    pub stops: u32,
     /// The order; `None`: the large one that waits, which is rare and only for a device whose
     /// torque is off.
     pub order: Option<Order>,

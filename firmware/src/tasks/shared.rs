@@ -20,9 +20,12 @@ pub struct Shared {
     pub trips: Trips,
     /// The causes that keep the device from being started.
     pub conditions: Conditions,
-    /// Which session's orders the tick carries out: those of a PC that went do not pass to the next
-    /// one. Written by telemetry.
-    pub session: AtomicU8,
+    /// The number of stops so far; the end of a session is one. No order from before the last of
+    /// them gives torque. Written by telemetry, before it raises the stop in `trips`.
+    pub stops: AtomicU32,
+    /// The number of orders that give torque which the tick has taken from the queue, modulo 2^32.
+    /// Written by the tick, after what `powered` says of them.
+    pub starts_taken: AtomicU32,
     /// Times of the stages.
     pub stages: Stages,
     /// Milliseconds that the supervisor has run; the tick watches it.
@@ -53,7 +56,8 @@ impl Shared {
             reports: Reports::new(),
             trips: Trips::new(),
             conditions: Conditions::new(),
-            session: AtomicU8::new(0),
+            stops: AtomicU32::new(0),
+            starts_taken: AtomicU32::new(0),
             stages: Stages::new(),
             supervised_ms: AtomicU32::new(0),
             powered: AtomicBool::new(false),
@@ -71,6 +75,12 @@ impl Shared {
     /// True if torque is on.
     pub fn is_powered(&self) -> bool {
         self.powered.load(Relaxed)
+    }
+
+    /// Takes torque away at the next tick, whatever waits in the queues: what waits there gives none.
+    pub(crate) fn stop(&self) {
+        self.stops.store(self.stops.load(Relaxed).wrapping_add(1), Relaxed);
+        self.trips.raise_stop();
     }
 
     /// Gives the supervisor the code that a converter of this width was given.

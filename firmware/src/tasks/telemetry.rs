@@ -11,10 +11,10 @@ use crate::supervision::Task;
 use crate::timing;
 use control_core::event::Fault;
 use control_core::interlock::Interlock;
-use control_core::{AnyOrder, LargeOrder, Order, Plan};
-use core::sync::atomic::Ordering::Relaxed;
+use control_core::{AnyOrder, LargeOrder, Plan};
+use core::sync::atomic::Ordering::{Acquire, Relaxed};
 use link::codec::MAX_FRAME;
-use link::device::{Endpoint, Identity, Waiting};
+use link::device::{Ahead, Endpoint, Identity, Waiting};
 use link::frames::{SaveError, Stage, Timing};
 
 /// Packets that the longest frame may need: only with room for all of them is a frame begun.
@@ -22,9 +22,6 @@ const FRAME_PACKETS: usize = MAX_FRAME / super::queues::PACKET_BYTES + 1;
 
 /// The byte at which every frame ends.
 const FRAME_END: u8 = 0;
-
-/// The configuration is saved later.
-struct TorqueIsOn;
 
 /// Telemetry's own state.
 pub struct Telemetry<B: Board> {
@@ -37,6 +34,10 @@ pub struct Telemetry<B: Board> {
     lamps: B::Lamps,
     /// An order that the tick had no room for.
     held: Option<AnyOrder>,
+    /// The number of orders that give torque so far, modulo 2^32.
+    starts_sent: u32,
+    /// The number of stops before the last of them.
+    stops_before_start: u32,
     next_tick: u64,
     filling: Packet,
     was_open: bool,
@@ -64,6 +65,8 @@ impl<B: Board> Telemetry<B> {
             ends,
             lamps,
             held: None,
+            starts_sent: 0,
+            stops_before_start: 0,
             next_tick: 0,
             filling: Packet::new(),
             was_open: false,
@@ -76,6 +79,7 @@ impl<B: Board> Telemetry<B> {
     pub fn run(&mut self) {
         let entered = B::cycles();
         self.watch_link();
+        self.endpoint.set_ahead(self.ahead());
         // Samples first: whether torque is on decides what a command may do.
         self.take_samples();
         self.take_commands();
@@ -99,27 +103,26 @@ impl<B: Board> Telemetry<B> {
             self.endpoint.disconnect();
             self.filling.clear();
             self.shared.discard.store(true, Relaxed);
-            self.shared.session.store(self.session().wrapping_add(1), Relaxed);
-            self.held = Some(Order::Stop.into());
-            self.forward_orders();
             if self.shared.is_powered() {
                 self.shared.trips.raise(Fault::LinkLost);
             }
+            self.stop();
         }
         self.was_open = is_open;
         self.was_ready = is_ready;
-    }
-
-    /// The number of the session.
-    fn session(&self) -> u8 {
-        self.shared.session.load(Relaxed)
     }
 
     fn take_commands(&mut self) {
         self.endpoint.set_interlocks(self.shared.conditions.get());
         while let Some(packet) = self.ends.from_pc.dequeue() {
             self.endpoint.receive(&packet);
+            if self.endpoint.take_stop() {
+                self.stop();
+                // Its answer waits for nothing that came after it.
+                self.send_frames();
+            }
             self.forward_orders();
+            self.endpoint.set_ahead(self.ahead());
         }
         B::allow_usb(true);
         self.forward_orders();
@@ -133,57 +136,65 @@ impl<B: Board> Telemetry<B> {
         self.in_session = in_session;
     }
 
+    /// A stop waits for nothing: what waits before it and gives torque is dropped.
+    fn stop(&mut self) {
+        self.shared.stop();
+        self.held.take_if(|order| order.gives_torque());
+    }
+
     /// Passes orders on until there are no more or the tick has no room.
     fn forward_orders(&mut self) {
         while let Some(order) = self.held.take().or_else(|| self.endpoint.next_order()) {
+            let is_large = matches!(order, AnyOrder::Large(_));
+            if !self.ends.orders.ready() || is_large && !self.ends.large_orders.ready() {
+                self.held = Some(order);
+                return;
+            }
+            let stops = self.shared.stops.load(Relaxed);
+            if order.gives_torque() {
+                self.starts_sent = self.starts_sent.wrapping_add(1);
+                self.stops_before_start = stops;
+            }
             let order = match order {
-                AnyOrder::Small(Order::Trip(fault)) => {
-                    self.shared.trips.raise(fault);
-                    continue;
-                }
                 AnyOrder::Small(order) => Some(order),
                 AnyOrder::Large(large) => {
-                    if !self.ends.orders.ready() || !self.ends.large_orders.ready() {
-                        self.held = Some(AnyOrder::Large(large));
-                        return;
+                    if let LargeOrder::Configure(plan) = &large {
+                        self.save(plan);
                     }
-                    if let LargeOrder::Configure(plan) = &large
-                        && self.save(plan).is_err()
-                    {
-                        self.held = Some(AnyOrder::Large(large));
-                        return;
-                    }
-                    // There is room: just seen.
                     let _ = self.ends.large_orders.enqueue(large);
                     None
                 }
             };
-            let queued = Queued { session: self.session(), order };
-            if self.ends.orders.enqueue(queued).is_err() {
-                // The room of a large one was seen above.
-                self.held = order.map(AnyOrder::Small);
-                return;
-            }
+            // There is room in both: just seen.
+            let _ = self.ends.orders.enqueue(Queued { stops, order });
         }
     }
 
-    /// Each part outlives a reset; one that has not changed costs no flash. The link takes none
-    /// while torque is on; a start and a stop may still be on their way to the tick, though, and an
-    /// erasure would stop the processor with the amplifier on: not before it is off.
-    fn save(&mut self, plan: &Plan) -> Result<(), TorqueIsOn> {
+    /// What the tick has done beyond the samples that have come. It may run between the two reads,
+    /// and says that the amplifier is on before it says that it has taken a start.
+    fn ahead(&self) -> Ahead {
+        let is_held = self.held.as_ref().is_some_and(AnyOrder::gives_torque);
+        let is_valid = self.stops_before_start == self.shared.stops.load(Relaxed);
+        let is_queued = is_valid && self.starts_sent != self.shared.starts_taken.load(Acquire);
+        Ahead { start_waits: is_held || is_queued, is_on: self.shared.is_powered() }
+    }
+
+    /// Each part outlives a reset; one that has not changed costs no flash. The link takes no
+    /// configuration while torque is on or a start is on its way, and while it is being saved the
+    /// tick gives none: an erasure stops the processor.
+    fn save(&mut self, plan: &Plan) {
+        debug_assert!(!self.shared.is_powered(), "the link refuses it");
         self.shared.conditions.set(Interlock::Saving, true);
-        let is_off = !self.shared.is_powered();
-        let saved = if is_off { self.save_parts(plan) } else { Ok(()) };
+        let saved = self.save_parts(plan);
         self.shared.conditions.set(Interlock::Saving, false);
-        let error = match saved {
-            Ok(()) => return if is_off { Ok(()) } else { Err(TorqueIsOn) },
-            Err(StoreError::Full) => SaveError::Full,
-            Err(StoreError::Flash) => SaveError::Flash,
-            Err(StoreError::TooLong) => SaveError::TooLong,
+        let Err(error) = saved else { return };
+        let error = match error {
+            StoreError::Full => SaveError::Full,
+            StoreError::Flash => SaveError::Flash,
+            StoreError::TooLong => SaveError::TooLong,
         };
         log::warn!("the configuration was not saved: {}", error as u8);
         self.endpoint.not_saved(self.next_tick, error);
-        Ok(())
     }
 
     fn save_parts(&mut self, plan: &Plan) -> Result<(), StoreError> {

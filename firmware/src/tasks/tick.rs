@@ -11,8 +11,8 @@ use control_core::controller::TickInput;
 use control_core::event::Fault;
 use control_core::excitation::Segments;
 use control_core::interlock::Interlock;
-use control_core::{Controller, LargeOrder, Order, Plan};
-use core::sync::atomic::Ordering::Relaxed;
+use control_core::{AnyOrder, Controller, LargeOrder, Order, Plan};
+use core::sync::atomic::Ordering::{Relaxed, Release};
 use link::frames::Stage;
 
 /// Ticks from one note of the motor's heat to the next.
@@ -82,10 +82,8 @@ impl<B: Board> Tick<B> {
         let entered = B::cycles();
         self.timer.acknowledge();
         let input = TickInput { count: self.encoder.count(), tilt: self.shared.tilt() };
-        if !self.shared.trips.is_empty()
-            && let Some(fault) = self.shared.trips.take()
-        {
-            self.controller.order(Order::Trip(fault));
+        if !self.shared.trips.is_empty() {
+            self.take_torque_away();
         }
         let output = self.controller.tick(input);
         self.drive.apply(self.width, &output);
@@ -93,15 +91,11 @@ impl<B: Board> Tick<B> {
 
         // The code is out; what follows may take its time, up to the deadline.
         self.shared.set_given(self.width, output.dac);
-        let powered = output.enable;
         if self.ends.outputs.enqueue(Ticked { tick: self.tick, output }).is_err() {
             // Telemetry sees the gap in the numbers and counts it.
         }
         self.tick = self.tick.wrapping_add(1);
-        if self.shared.is_powered() != powered {
-            self.shared.powered.store(powered, Relaxed);
-            self.shared.last_words.torque(powered);
-        }
+        self.note_power(output.enable);
         if self.tick.is_multiple_of(HEAT_TICKS) {
             self.shared.last_words.heat(self.controller.heat());
         }
@@ -115,53 +109,62 @@ impl<B: Board> Tick<B> {
         }
     }
 
+    /// A stop before a fault: the fault is to stay latched.
+    #[cold]
+    #[inline(never)]
+    fn take_torque_away(&mut self) {
+        if self.shared.trips.take_stop() {
+            self.controller.order(Order::Stop);
+        }
+        if let Some(fault) = self.shared.trips.take() {
+            self.controller.order(Order::Trip(fault));
+        }
+    }
+
     /// At most one order a tick, so that a storm of them costs no more than one.
     fn take_order(&mut self) {
-        let Some(Queued { session, order }) = self.ends.orders.dequeue() else { return };
+        let Some(Queued { stops, order }) = self.ends.orders.dequeue() else { return };
         match order {
-            Some(Order::Start) => self.power_up(session),
+            Some(Order::Start) => self.power_up(stops, Order::Start),
             Some(Order::Heartbeat) => self.controller.heartbeat(),
             Some(order) => self.controller.order(order),
-            None => self.take_large_order(session),
+            None => self.take_large_order(stops),
         }
     }
 
     /// On its own, because it is rare and an order takes much room.
     #[cold]
     #[inline(never)]
-    fn take_large_order(&mut self, session: u8) {
+    fn take_large_order(&mut self, stops: u32) {
         let Some(order) = self.ends.large_orders.dequeue() else { return };
-        if matches!(order, LargeOrder::Excite(_) | LargeOrder::Play(_)) && !self.may_power_up(session) {
-            return;
+        if matches!(order, LargeOrder::Excite(_) | LargeOrder::Play(_)) {
+            return self.power_up(stops, order);
         }
         self.controller.order(order);
         // A plan that came while torque was on has not been taken.
         self.width = self.controller.plan().config().device.dac;
     }
 
-    /// True for the PC that is there and under no interlock, which trips.
+    /// Torque on by `order`, if no stop has come after it and under no interlock; telemetry has
+    /// refused it before where it could know.
     #[cold]
     #[inline(never)]
-    fn may_power_up(&mut self, session: u8) -> bool {
-        if session != self.shared.session.load(Relaxed) {
-            return false;
+    fn power_up(&mut self, stops: u32, order: impl Into<AnyOrder>) {
+        if stops == self.shared.stops.load(Relaxed) {
+            match self.shared.conditions.get().first() {
+                None => self.controller.order(order),
+                Some(interlock) => self.controller.order(Order::Trip(interlock.fault())),
+            }
+            self.note_power(self.controller.is_powered());
         }
-        let interlock = self.shared.conditions.get().first();
-        if let Some(interlock) = interlock {
-            self.controller.order(Order::Trip(interlock.fault()));
-        }
-        interlock.is_none()
+        let taken = self.shared.starts_taken.load(Relaxed).wrapping_add(1);
+        self.shared.starts_taken.store(taken, Release);
     }
 
-    /// Torque on, for the PC that is there and under no interlock; telemetry has refused it before
-    /// where it could know.
-    fn power_up(&mut self, session: u8) {
-        if session != self.shared.session.load(Relaxed) {
-            return;
-        }
-        match self.shared.conditions.get().first() {
-            None => self.controller.order(Order::Start),
-            Some(interlock) => self.controller.order(Order::Trip(interlock.fault())),
+    fn note_power(&self, powered: bool) {
+        if self.shared.is_powered() != powered {
+            self.shared.powered.store(powered, Relaxed);
+            self.shared.last_words.torque(powered);
         }
     }
 

@@ -185,7 +185,10 @@ impl<'a> Bench<'a> {
         longest: Duration,
     ) -> Result<(Vec<Sample>, Option<Fault>), Error> {
         self.samples.clear();
-        self.fault = None;
+        // The dialogue that it ended has been told of it, and goes on before the eyes of a person.
+        if self.fault.take().is_some() {
+            self.driver.clear();
+        }
         self.driver.excite(excitation.clone());
         let is_played = |sample: &Sample| sample.state == State::Excitation as u8;
         self.until("the device did not begin to move; restart it", |bench| {

@@ -6,10 +6,11 @@
 //! until they are answered; a heartbeat says every 50 ms that the PC lives.
 
 use control_core::compensation::Gains;
+use control_core::event::Fault;
 use control_core::excitation::Excitation;
 use control_core::{Device, Patient};
 use link::codec::{self, MAX_FRAME};
-use link::frames::{Ack, Command, CommandRefusal, DeviceFrame, PROTOCOL_VERSION};
+use link::frames::{Ack, Command, CommandRefusal, DeviceFrame, EventKind, PROTOCOL_VERSION};
 use link::host::{Commands, Counts, Reception};
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -41,6 +42,8 @@ pub struct Driver {
     last_heartbeat: Option<Duration>,
     notice: Option<String>,
     refused: Option<String>,
+    /// The fault that the device reports, until a person clears it.
+    fault: Option<Fault>,
     /// The answer to the last request for another patient.
     changed: Option<Result<(), String>>,
     out: Vec<u8>,
@@ -77,6 +80,7 @@ impl Driver {
             last_heartbeat: None,
             notice: None,
             refused: None,
+            fault: None,
             changed: None,
             out: Vec::new(),
         }
@@ -102,7 +106,7 @@ impl Driver {
         self.pending = None;
     }
 
-    /// Powers up, once the device is ready; a latched fault is cleared.
+    /// Powers up, once the device is ready; refused while a fault is latched.
     pub fn start(&mut self) {
         self.waiting.push_back(Command::Start);
     }
@@ -126,6 +130,12 @@ impl Driver {
         }) {
             self.pending = None;
         }
+    }
+
+    /// A person has seen the fault: stops the device and clears it.
+    pub fn clear(&mut self) {
+        self.stop();
+        self.waiting.push_back(Command::Clear);
     }
 
     /// Sets depth 0 to where the needle is when the device carries this out.
@@ -187,6 +197,12 @@ impl Driver {
             match &frame {
                 DeviceFrame::Ack(ack) => self.answered(now, ack),
                 DeviceFrame::Samples(_) => self.last_samples = now,
+                DeviceFrame::Hello(hello) => self.fault = hello.fault,
+                DeviceFrame::Event(event) => match event.kind {
+                    EventKind::Fault { cause } => self.fault = Some(cause),
+                    EventKind::Cleared => self.fault = None,
+                    _ => {}
+                },
                 _ => {}
             }
             see(&frame);
@@ -246,6 +262,11 @@ impl Driver {
         self.notice.as_deref()
     }
 
+    /// Returns the fault that the device reports, until a person clears it.
+    pub fn fault(&self) -> Option<Fault> {
+        self.fault
+    }
+
     /// Returns the reason why this device can never run this configuration, if it gave one.
     pub fn refused(&self) -> Option<&str> {
         self.refused.as_deref()
@@ -303,7 +324,10 @@ impl Driver {
                 self.has_started = true;
                 self.notice = None;
             }
-            (Ok(()), Command::Stop | Command::Zero | Command::Excite(_) | Command::Play { .. }) => {
+            (
+                Ok(()),
+                Command::Stop | Command::Clear | Command::Zero | Command::Excite(_) | Command::Play { .. },
+            ) => {
                 self.notice = None;
             }
             (Ok(()), _) => {}

@@ -78,6 +78,9 @@ pub struct Run {
     /// With --headless: the tip is on the skin now, so set depth 0 here
     #[arg(long, requires = "headless")]
     zero: bool,
+    /// With --headless: you have looked at the device and clear the fault that it reports
+    #[arg(long, requires = "headless")]
+    clear_fault: bool,
     /// Stop after this many seconds of samples; without it, Ctrl-C ends the run cleanly
     #[arg(long, value_name = "S")]
     seconds: Option<f64>,
@@ -228,6 +231,7 @@ impl Run {
             None => run_loop,
         };
         if self.is_virtual() || self.headless {
+            let run_loop = if self.clear_fault { run_loop.clearing_first() } else { run_loop };
             if self.zero { run_loop.zeroing_first() } else { run_loop }
         } else {
             // A real motor comes on when somebody who sees it says so; without a page, this command

@@ -9,6 +9,8 @@ export default {
   "picture.view": "Ansicht",
   "start.start": "Start",
   "start.title": "Verstärker ein; das Drehmoment steigt langsam an",
+  "start.clear": "Störung quittieren",
+  "start.clear_title": "Das Gerät ist angesehen und darf wieder gestartet werden",
   "start.play": "Abspielen",
   "start.play_title": "Die Aufzeichnung läuft weiter",
   "stop.stop": "Stopp",
@@ -19,6 +21,7 @@ export default {
   "demo.demo": "Demo",
   "demo.title": "Die automatische Hand übernimmt die Nadel wieder",
   // Messages across the page.
+  "banner.fault": "Drehmoment aus: {cause}. Sehen Sie das Gerät an, dann drücken Sie „Störung quittieren“.",
   "banner.since": "seit {seconds} s keine Daten",
   "banner.owed": "Ihr Stopp konnte nicht gesendet werden; trennen Sie zur Sicherheit die Stromversorgung.",
   "banner.lost": "Verbindung zum Programm verloren. Sie wird wiederhergestellt.",
@@ -209,6 +212,7 @@ export default {
   "event.vessel": "Nadelspitze im Gefäß",
   "event.exit": "{name} verlassen",
   "event.fault": "Störung, Drehmoment aus: {cause}",
+  "event.cleared": "Störung quittiert",
   "event.started": "Gestartet, Drehmoment steigt an",
   "event.stopped": "Gestoppt, Drehmoment aus",
   // Practice.

@@ -9,6 +9,8 @@ export default {
   "picture.view": "View",
   "start.start": "Start",
   "start.title": "Amplifier on; torque fades in",
+  "start.clear": "Clear fault",
+  "start.clear_title": "You have looked at the device: it may be started again",
   "start.play": "Play",
   "start.play_title": "The recording goes on",
   "stop.stop": "Stop",
@@ -19,6 +21,7 @@ export default {
   "demo.demo": "Demo",
   "demo.title": "The scripted hand takes the needle again",
   // Messages across the page.
+  "banner.fault": "Torque off: {cause}. Look at the device, then press Clear fault.",
   "banner.since": "no data for {seconds} s",
   "banner.owed": "Your stop could not be sent; to be safe cut the power.",
   "banner.lost": "Connection to the program lost. Reconnecting.",
@@ -209,6 +212,7 @@ export default {
   "event.vessel": "Needle in the {name}",
   "event.exit": "Needle out of the {name}",
   "event.fault": "Fault, torque off: {cause}",
+  "event.cleared": "Fault cleared",
   "event.started": "Started, torque fades in",
   "event.stopped": "Stopped, torque off",
   // Practice.

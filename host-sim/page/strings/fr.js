@@ -9,6 +9,8 @@ export default {
   "picture.view": "Vue",
   "start.start": "Démarrer",
   "start.title": "Amplificateur activé\u202f; le couple augmente progressivement",
+  "start.clear": "Acquitter",
+  "start.clear_title": "Vous avez examiné l’appareil\u202f: il peut redémarrer",
   "start.play": "Lecture",
   "start.play_title": "L’enregistrement reprend",
   "stop.stop": "Arrêt",
@@ -19,6 +21,7 @@ export default {
   "demo.demo": "Démo",
   "demo.title": "La main automatique reprend l’aiguille",
   // Messages across the page.
+  "banner.fault": "Couple coupé\u00a0: {cause}. Examinez l’appareil, puis acquittez le défaut.",
   "banner.since": "aucune donnée depuis {seconds} s",
   "banner.owed": "Votre arrêt n’a pas pu être transmis\u202f; par sécurité, coupez l’alimentation.",
   "banner.lost": "Connexion au programme perdue. Reconnexion en cours.",
@@ -209,6 +212,7 @@ export default {
   "event.vessel": "Aiguille dans le vaisseau",
   "event.exit": "Sortie\u00a0: {name}",
   "event.fault": "Défaut, couple coupé\u00a0: {cause}",
+  "event.cleared": "Défaut acquitté",
   "event.started": "Démarré, le couple augmente",
   "event.stopped": "Arrêté, couple coupé",
   // Practice.

@@ -156,6 +156,7 @@ impl Outlets {
                 samples: counts.samples,
                 lost_samples: counts.lost_samples,
                 garbage: counts.garbage,
+                fault: driver.fault().map(|fault| fault.to_string()),
                 recording,
                 recorded: self.recorded.clone(),
                 notice,

@@ -40,6 +40,8 @@ pub struct RunLoop<'a> {
     person_starts: bool,
     /// The tip is at depth 0 when it is started for the first time.
     zeroes_first: bool,
+    /// The person who started the program has seen the fault that the device reports.
+    clears_first: bool,
     /// The patient, if it may be changed.
     patients: Option<PatientManager>,
     /// The practice that judges insertions while somebody looks.
@@ -67,6 +69,7 @@ impl<'a> RunLoop<'a> {
             has_asked: false,
             person_starts: false,
             zeroes_first: false,
+            clears_first: false,
             patients: None,
             practice: None,
         }
@@ -81,6 +84,12 @@ impl<'a> RunLoop<'a> {
     /// Depth 0 is where the needle is when the device is started for the first time.
     pub fn zeroing_first(mut self) -> Self {
         self.zeroes_first = true;
+        self
+    }
+
+    /// The person who asks for the run has seen the fault that the device reports.
+    pub fn clearing_first(mut self) -> Self {
+        self.clears_first = true;
         self
     }
 
@@ -247,6 +256,9 @@ impl<'a> RunLoop<'a> {
             self.driver.report_device();
         }
         if !self.person_starts && !self.driver.has_started() && !self.driver.is_starting() {
+            if std::mem::take(&mut self.clears_first) {
+                self.driver.clear();
+            }
             if std::mem::take(&mut self.zeroes_first) {
                 self.driver.zero();
             }
@@ -283,6 +295,7 @@ impl<'a> RunLoop<'a> {
                 self.person_starts = true;
                 self.driver.stop();
             }
+            Control::Clear => self.driver.clear(),
             Control::Zero => self.driver.zero(),
             Control::Choose { patient } => self.ask_patient(|patients| patients.choose(&patient)),
             Control::Edit { profile } => self.ask_patient(|patients| patients.edit(&profile)),

@@ -2,7 +2,7 @@
 
 use super::{Endpoint, Waiting};
 use crate::commissioning::{Proof, may_become};
-use crate::frames::{Ack, Command, CommandRefusal, HostFrame, PROTOCOL_VERSION};
+use crate::frames::{Ack, Command, CommandRefusal, EventKind, HostFrame, PROTOCOL_VERSION};
 use control_core::compensation::check::check;
 use control_core::config::Device;
 use control_core::excitation::Excitation;
@@ -27,33 +27,52 @@ fn needs_torque_off(command: &Command) -> bool {
     )
 }
 
+/// True if the command turns the amplifier on.
+fn gives_torque(command: &Command) -> bool {
+    matches!(command, Command::Start | Command::Excite(_) | Command::Play { .. })
+}
+
 impl<W: BorrowMut<Waiting>> Endpoint<W> {
     pub(super) fn command(&mut self, frame: HostFrame) {
         if matches!(frame.command, Command::Hello { .. }) {
             // A PC that starts anew may use old ids again.
             self.answered.clear();
+            self.last_stop = None;
         } else if let Some(ack) = self.answered.oldest_ordered().find(|ack| ack.id == frame.id) {
             let _ = self.waiting.borrow_mut().acks.push_back(*ack);
             return;
         }
-        let result = self.carry_out(frame.command);
+        let result = self.carry_out(frame.id, frame.command);
         let ack = Ack { id: frame.id, result };
         if result != Err(CommandRefusal::Full) {
             self.answered.write(ack);
         }
-        // Where the PC floods faster than it reads, an ack is lost: it asks again and is answered
-        // again.
-        let _ = self.waiting.borrow_mut().acks.push_back(ack);
+        // Where the PC floods faster than it reads, the oldest ack is lost: it asks again and is
+        // answered again.
+        let acks = &mut self.waiting.borrow_mut().acks;
+        if acks.is_full() {
+            acks.pop_front();
+        }
+        let _ = acks.push_back(ack);
     }
 
-    fn carry_out(&mut self, command: Command) -> Result<(), CommandRefusal> {
-        if (self.powered || self.start_ordered) && needs_torque_off(&command) {
+    fn carry_out(&mut self, id: u32, command: Command) -> Result<(), CommandRefusal> {
+        let has_torque = self.powered || self.start_ordered || self.ahead.is_on || self.ahead.start_waits;
+        if has_torque && needs_torque_off(&command) {
             return Err(CommandRefusal::Powered);
+        }
+        if gives_torque(&command) {
+            self.is_later_than_stop(id)?;
         }
         match command {
             Command::Hello { version } => self.hello_to(version),
             Command::Heartbeat => self.order(Order::Heartbeat),
-            Command::Stop => self.stop(),
+            Command::Stop => {
+                self.last_stop = Some(id);
+                self.stop();
+                Ok(())
+            }
+            Command::Clear => self.clear(),
             Command::Start => self.start(),
             Command::Zero => {
                 self.order(Order::Zero)?;
@@ -108,13 +127,46 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
         self.order(Order::Heartbeat)
     }
 
-    fn stop(&mut self) -> Result<(), CommandRefusal> {
+    fn stop(&mut self) {
+        self.stopped_since_fault = true;
+        self.stop_due = true;
+        self.drop_starts();
+    }
+
+    /// Nothing that was asked for so far gives torque; the rest is still carried out.
+    pub(super) fn drop_starts(&mut self) {
         self.start_ordered = false;
         self.proof.interrupt();
         self.upload.forget();
-        // A stop must not wait behind other orders.
-        self.waiting.borrow_mut().orders.clear();
-        self.order(Order::Stop)
+        let orders = &mut self.waiting.borrow_mut().orders;
+        for _ in 0..orders.len() {
+            if let Some(order) = orders.pop_front()
+                && !order.gives_torque()
+            {
+                let _ = orders.push_back(order);
+            }
+        }
+    }
+
+    /// Ids wrap.
+    fn is_later_than_stop(&self, id: u32) -> Result<(), CommandRefusal> {
+        let is_overtaken = self.last_stop.is_some_and(|stop| id.wrapping_sub(stop).cast_signed() <= 0);
+        if is_overtaken { Err(CommandRefusal::Overtaken) } else { Ok(()) }
+    }
+
+    /// A person has seen the fault, and has been told what ended the last run.
+    fn clear(&mut self) -> Result<(), CommandRefusal> {
+        if self.fault.is_none() {
+            return Ok(());
+        }
+        if !self.stopped_since_fault {
+            return Err(CommandRefusal::NotStopped);
+        }
+        self.order(Order::Clear)?;
+        self.fault = None;
+        self.crash = None;
+        self.event(self.now, EventKind::Cleared);
+        Ok(())
     }
 
     fn start(&mut self) -> Result<(), CommandRefusal> {
@@ -141,12 +193,9 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
         Ok(())
     }
 
-    /// A person has started the device, and has been told what ended its last run. A sequence that
-    /// still waits is not what was wanted.
+    /// A sequence that still waits is not what was wanted.
     pub(super) fn will_power_up(&mut self) {
         self.start_ordered = true;
-        self.fault = None;
-        self.crash = None;
         self.upload.forget();
     }
 
@@ -155,12 +204,15 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
         if is { Ok(()) } else { Err(CommandRefusal::Interlocked(Interlock::NotCommissioned)) }
     }
 
-    /// Torque is given to a PC that listens, and under no interlock.
+    /// Torque is given to a PC that listens, under no interlock and without a latched fault.
     pub(super) fn may_give_torque(&self) -> Result<(), CommandRefusal> {
         if !self.in_session {
             return Err(CommandRefusal::NoSession);
         }
-        self.interlocks.first().map_or(Ok(()), |interlock| Err(CommandRefusal::Interlocked(interlock)))
+        if let Some(interlock) = self.interlocks.first() {
+            return Err(CommandRefusal::Interlocked(interlock));
+        }
+        self.fault.map_or(Ok(()), |fault| Err(CommandRefusal::Faulted(fault)))
     }
 
     /// A patient for another device leaves; what is wrong with the device itself is wrong without a

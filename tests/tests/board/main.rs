@@ -18,6 +18,7 @@ mod runaway;
 mod second_board;
 mod settled;
 mod silicon;
+mod stop;
 mod store;
 mod sustained;
 mod usb;

@@ -291,7 +291,7 @@ pub(super) fn run(tick: &mut Tick<Fake>, shared: &Shared, ticks: u32) {
     }
 }
 
-/// As telemetry passes on an order of the session of this number.
-pub(super) fn order(telemetry: &mut TelemetryEnds, session: u8, order: Order) {
-    assert!(telemetry.orders.enqueue(Queued { session, order: Some(order) }).is_ok());
+/// As telemetry passes on an order that has so many stops before it.
+pub(super) fn order(telemetry: &mut TelemetryEnds, stops: u32, order: Order) {
+    assert!(telemetry.orders.enqueue(Queued { stops, order: Some(order) }).is_ok());
 }

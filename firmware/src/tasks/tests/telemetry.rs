@@ -74,17 +74,18 @@ impl Desk {
 }
 
 #[test]
-fn a_start_reaches_the_tick_with_its_session() {
+fn a_start_reaches_the_tick_with_its_number() {
     let mut desk = Desk::new();
     assert_eq!(desk.answer(Command::Start), Err(CommandRefusal::NoSession));
     let mut desk = Desk::in_session();
-    desk.shared.session.store(3, Relaxed);
+    assert_eq!(desk.answer(Command::Stop), Ok(()));
+    assert!(desk.shared.trips.take_stop());
     let unknown = Err(CommandRefusal::Interlocked(Interlock::NotZeroed));
     assert_eq!(desk.answer(Command::Start), unknown, "nobody has said where depth 0 is");
     assert_eq!(desk.answer(Command::Zero), Ok(()));
     assert!(matches!(desk.tick.orders.dequeue(), Some(Queued { order: Some(Order::Zero), .. })));
     assert_eq!(desk.answer(Command::Start), Ok(()));
-    assert!(matches!(desk.tick.orders.dequeue(), Some(Queued { session: 3, order: Some(Order::Start) })));
+    assert!(matches!(desk.tick.orders.dequeue(), Some(Queued { stops: 1, order: Some(Order::Start) })));
     desk.shared.conditions.set(Interlock::AmplifierNotReady, true);
     let refused = Err(CommandRefusal::Interlocked(Interlock::AmplifierNotReady));
     assert_eq!(desk.answer(Command::Start), refused);
@@ -95,15 +96,14 @@ fn a_start_reaches_the_tick_with_its_session() {
 fn what_was_under_way_when_the_pc_went_is_thrown_away() {
     for gone in [0, LINK_CONFIGURED] {
         let mut desk = Desk::in_session();
-        let session = desk.shared.session.load(Relaxed);
         desk.shared.powered.store(true, Relaxed);
         desk.say(Command::Zero);
         desk.say(Command::Start);
         desk.shared.link.store(gone, Relaxed);
         assert!(desk.turn().is_empty(), "nobody listens");
-        assert!(matches!(desk.tick.orders.dequeue(), Some(Queued { order: Some(Order::Stop), .. })));
         assert!(desk.tick.orders.dequeue().is_none(), "the start is gone");
-        assert_eq!(desk.shared.session.load(Relaxed), session.wrapping_add(1));
+        assert_eq!(desk.shared.stops.load(Relaxed), 1);
+        assert!(desk.shared.trips.take_stop());
         assert_eq!(desk.shared.trips.take(), Some(Fault::LinkLost));
         assert!(desk.shared.discard.load(Relaxed));
     }
@@ -114,12 +114,13 @@ fn a_configuration_is_saved_without_torque_or_reported_failed() {
     let mut config = Device::commissioned_virtual();
     config.limits.fade_in_ms = 444;
     let mut desk = Desk::in_session();
-    // The tick has not stopped yet: the link does not know, telemetry does.
+    // The tick has not stopped yet: no sample says so, the tick does.
     desk.shared.powered.store(true, Relaxed);
-    desk.answer(Command::ConfigureDevice(config)).unwrap();
-    assert!(desk.tick.orders.dequeue().is_none(), "it waits");
+    let refused = Err(CommandRefusal::Powered);
+    assert_eq!(desk.answer(Command::ConfigureDevice(config)), refused, "it does not wait");
+    assert!(desk.tick.orders.dequeue().is_none());
     desk.shared.powered.store(false, Relaxed);
-    desk.turn();
+    assert_eq!(desk.answer(Command::ConfigureDevice(config)), Ok(()));
     assert!(matches!(desk.tick.orders.dequeue(), Some(Queued { order: None, .. })));
     assert!(desk.tick.large_orders.dequeue().is_some());
     assert!(!desk.shared.conditions.get().contains(Interlock::Saving));
@@ -169,4 +170,20 @@ fn orders_that_the_tick_has_no_room_for_wait() {
     desk.turn();
     let later = core::iter::from_fn(|| desk.tick.orders.dequeue()).count();
     assert!(taken == 15 && later > 0, "{taken}, then {later}");
+}
+
+#[test]
+fn a_configuration_is_refused_until_the_tick_has_taken_the_start() {
+    let mut config = Device::commissioned_virtual();
+    config.limits.fade_in_ms = 444;
+    let mut desk = Desk::in_session();
+    desk.answer(Command::Zero).unwrap();
+    desk.answer(Command::Start).unwrap();
+    // A sample from before the start.
+    let output = Controller::new(plan()).tick(TickInput::default());
+    assert!(desk.tick.outputs.enqueue(Ticked { tick: 0, output }).is_ok());
+    desk.turn();
+    assert_eq!(desk.answer(Command::ConfigureDevice(config)), Err(CommandRefusal::Powered));
+    assert_eq!(desk.answer(Command::Stop), Ok(()), "which makes the start void");
+    assert_eq!(desk.answer(Command::ConfigureDevice(config)), Ok(()));
 }

@@ -11,18 +11,22 @@ use core::sync::atomic::Ordering::Relaxed;
 use std::vec::Vec;
 
 #[test]
-fn the_tick_starts_only_for_the_current_session() {
+fn no_start_from_before_a_stop_gives_torque() {
     let (mut tick, shared, mut telemetry) = tick();
-    shared.session.store(7, Relaxed);
-    order(&mut telemetry, 6, Order::Start);
+    shared.stop();
+    order(&mut telemetry, 0, Order::Start);
     run(&mut tick, shared, 3);
-    assert!(!world().enabled.get() && !shared.is_powered(), "of a PC that is gone");
-    order(&mut telemetry, 7, Order::Start);
-    run(&mut tick, shared, 2);
+    assert!(!world().enabled.get() && !shared.is_powered(), "a stop has come after it");
+    order(&mut telemetry, 1, Order::Start);
+    run(&mut tick, shared, 1);
+    assert!(shared.is_powered(), "known before the next tick");
+    assert_eq!(shared.starts_taken.load(Relaxed), 2);
+    run(&mut tick, shared, 1);
     assert!(world().enabled.get() && shared.is_powered());
-    order(&mut telemetry, 0, Order::Stop);
-    run(&mut tick, shared, 2);
-    assert!(!world().enabled.get() && !shared.is_powered());
+    (0..9).for_each(|_| order(&mut telemetry, 1, Order::Heartbeat));
+    shared.stop();
+    run(&mut tick, shared, 1);
+    assert!(!world().enabled.get() && !shared.is_powered(), "a stop waits behind nothing");
     assert_eq!(world().codes.borrow().last(), Some(&2048));
 }
 
@@ -44,7 +48,7 @@ fn the_tick_takes_a_trip_at_once_and_a_plan_only_without_torque() {
     let eight = Plan::new(&eight, &Patient::default()).unwrap();
     let configure = |telemetry: &mut TelemetryEnds| {
         assert!(telemetry.large_orders.enqueue(LargeOrder::Configure(eight.clone())).is_ok());
-        assert!(telemetry.orders.enqueue(Queued { session: 0, order: None }).is_ok());
+        assert!(telemetry.orders.enqueue(Queued { stops: 0, order: None }).is_ok());
     };
     order(&mut telemetry, 0, Order::Start);
     run(&mut tick, shared, 2);

@@ -130,6 +130,7 @@ impl Condenser {
             EventKind::Exit { layer } => ("exit", Some(layer), None, None),
             EventKind::Fault { cause } => ("fault", None, Some(cause.to_string()), None),
             EventKind::Limits { in_force } => ("limits", None, None, Some(in_force.0)),
+            EventKind::Cleared => ("cleared", None, None, None),
             EventKind::Started => ("started", None, None, None),
             EventKind::Stopped => ("stopped", None, None, None),
             EventKind::NotSaved { cause } => ("not_saved", None, Some(cause.to_string()), None),

@@ -15,6 +15,8 @@ pub enum Control {
     Start,
     /// Torque off.
     Stop,
+    /// The person has seen the fault.
+    Clear,
     /// The needle is at depth 0 now.
     Zero,
     /// The hand wants the tip here.

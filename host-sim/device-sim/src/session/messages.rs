@@ -70,6 +70,8 @@ pub struct LinkStatus {
     pub lost_samples: u64,
     /// Pieces between frames that were none.
     pub garbage: u64,
+    /// The fault that the device reports, until a person clears it.
+    pub fault: Option<String>,
     /// The recording in progress.
     pub recording: Option<RecordingStatus>,
     /// The file of the last recording that was ended in the page.

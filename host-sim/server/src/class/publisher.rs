@@ -64,7 +64,7 @@ impl ClassPublisher {
         for happening in &batch.events {
             match happening.event.kind {
                 EventKind::Fault { cause } => self.fault = Some(cause.to_string()),
-                EventKind::Started => self.fault = None,
+                EventKind::Cleared => self.fault = None,
                 _ => {}
             }
         }
@@ -251,7 +251,7 @@ mod tests {
         });
         let about = about_after(34, 7.0);
         assert!(about["fault"].is_string(), "{about}");
-        publisher.event(link::frames::Event { tick: 341_000, kind: EventKind::Started });
+        publisher.event(link::frames::Event { tick: 341_000, kind: EventKind::Cleared });
         assert!(about_after(35, 7.0)["fault"].is_null());
     }
 }

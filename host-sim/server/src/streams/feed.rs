@@ -149,12 +149,12 @@ pub(super) async fn run(mut subscription: Subscription, publish: watch::Sender<S
     }
 }
 
-/// Returns an event's effect on the latched fault: one latches, a start clears it, others have
-/// none.
+/// Returns an event's effect on the latched fault: one latches, a person clears it, others
+/// have none.
 fn fault(happening: &Happening) -> Option<Option<String>> {
     match happening.event.kind {
         link::frames::EventKind::Fault { cause } => Some(Some(cause.to_string())),
-        link::frames::EventKind::Started => Some(None),
+        link::frames::EventKind::Cleared => Some(None),
         _ => None,
     }
 }
