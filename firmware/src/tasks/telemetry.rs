@@ -10,7 +10,7 @@ use crate::store::{Store, StoreError};
 use crate::supervision::Task;
 use crate::timing;
 use control_core::event::Fault;
-use control_core::interlock::Interlock;
+use control_core::interlock::{Interlock, Interlocks};
 use control_core::{AnyOrder, LargeOrder, Order, Plan};
 use core::sync::atomic::Ordering::Relaxed;
 use link::codec::MAX_FRAME;
@@ -23,8 +23,8 @@ const FRAME_PACKETS: usize = MAX_FRAME / super::queues::PACKET_BYTES + 1;
 /// The byte at which every frame ends.
 const FRAME_END: u8 = 0;
 
-/// The configuration is saved later.
-struct TorqueIsOn;
+/// The configuration is not yet saved: torque is on, or the flash has not taken all of it.
+struct Later;
 
 /// Telemetry's own state.
 pub struct Telemetry<B: Board> {
@@ -42,6 +42,8 @@ pub struct Telemetry<B: Board> {
     was_open: bool,
     was_ready: bool,
     in_session: bool,
+    /// True if this turn has written its share of a save.
+    has_written: bool,
 }
 
 impl<B: Board> Telemetry<B> {
@@ -69,12 +71,14 @@ impl<B: Board> Telemetry<B> {
             was_open: false,
             was_ready: false,
             in_session: false,
+            has_written: false,
         }
     }
 
     /// One turn: link state, commands, samples, frames.
     pub fn run(&mut self) {
         let entered = B::cycles();
+        self.has_written = false;
         self.watch_link();
         // Samples first: whether torque is on decides what a command may do.
         self.take_samples();
@@ -96,11 +100,14 @@ impl<B: Board> Telemetry<B> {
             // Nothing that it asked for outlives it: neither what has not been read yet, nor a
             // start that the tick has not seen yet.
             while self.ends.from_pc.dequeue().is_some() {}
+            self.keep_configuration();
             self.endpoint.disconnect();
             self.filling.clear();
             self.shared.discard.store(true, Relaxed);
             self.shared.session.store(self.session().wrapping_add(1), Relaxed);
-            self.held = Some(Order::Stop.into());
+            if !self.holds_configuration() {
+                self.held = Some(Order::Stop.into());
+            }
             self.forward_orders();
             if self.shared.is_powered() {
                 self.shared.trips.raise(Fault::LinkLost);
@@ -110,13 +117,33 @@ impl<B: Board> Telemetry<B> {
         self.was_ready = is_ready;
     }
 
+    /// True while a configuration waits, until it is saved or the tick has room. The link takes one
+    /// only where the last order was no start, so that there is nothing to stop.
+    fn holds_configuration(&self) -> bool {
+        matches!(self.held, Some(AnyOrder::Large(LargeOrder::Configure(_)))) && !self.shared.is_powered()
+    }
+
+    /// The PC was told that its configurations are in force, and the last one says both parts: what
+    /// waits ends with it.
+    fn keep_configuration(&mut self) {
+        while self.holds_configuration()
+            && let Some(order) = self.endpoint.next_order()
+        {
+            if matches!(order, AnyOrder::Large(LargeOrder::Configure(_))) {
+                self.held = Some(order);
+            }
+        }
+    }
+
     /// The number of the session.
     fn session(&self) -> u8 {
         self.shared.session.load(Relaxed)
     }
 
     fn take_commands(&mut self) {
-        self.endpoint.set_interlocks(self.shared.conditions.get());
+        // A start that follows a configuration waits behind it.
+        let saving = Interlocks::of(Interlock::Saving);
+        self.endpoint.set_interlocks(Interlocks(self.shared.conditions.get().0 & !saving.0));
         while let Some(packet) = self.ends.from_pc.dequeue() {
             self.endpoint.receive(&packet);
             self.forward_orders();
@@ -169,14 +196,20 @@ impl<B: Board> Telemetry<B> {
 
     /// Each part outlives a reset; one that has not changed costs no flash. The link takes none
     /// while torque is on; a start and a stop may still be on their way to the tick, though, and an
-    /// erasure would stop the processor with the amplifier on: not before it is off.
-    fn save(&mut self, plan: &Plan) -> Result<(), TorqueIsOn> {
+    /// erasure would stop the processor with the amplifier on: not before it is off. A turn writes
+    /// for its share of time only, for the tilt task waits meanwhile.
+    fn save(&mut self, plan: &Plan) -> Result<(), Later> {
+        if self.has_written {
+            return Err(Later);
+        }
         self.shared.conditions.set(Interlock::Saving, true);
         let is_off = !self.shared.is_powered();
         let saved = if is_off { self.save_parts(plan) } else { Ok(()) };
-        self.shared.conditions.set(Interlock::Saving, false);
+        self.has_written = saved == Err(StoreError::Unfinished);
+        self.shared.conditions.set(Interlock::Saving, self.has_written);
         let error = match saved {
-            Ok(()) => return if is_off { Ok(()) } else { Err(TorqueIsOn) },
+            Ok(()) => return if is_off { Ok(()) } else { Err(Later) },
+            Err(StoreError::Unfinished) => return Err(Later),
             Err(StoreError::Full) => SaveError::Full,
             Err(StoreError::Flash) => SaveError::Flash,
             Err(StoreError::TooLong) => SaveError::TooLong,
@@ -187,13 +220,15 @@ impl<B: Board> Telemetry<B> {
     }
 
     fn save_parts(&mut self, plan: &Plan) -> Result<(), StoreError> {
+        let began = B::cycles();
+        let goes_on = || B::cycles().wrapping_sub(began) < timing::SAVE_CYCLES;
         let (device, patient) = (link::codec::hash(plan.device()), link::codec::hash(plan.patient()));
         if device != self.saved.0 {
-            self.store.save_device(plan.device())?;
+            self.store.save_device(plan.device(), goes_on)?;
             self.saved.0 = device;
         }
         if patient != self.saved.1 {
-            self.store.save_patient(plan.patient())?;
+            self.store.save_patient(plan.patient(), goes_on)?;
             self.saved.1 = patient;
         }
         Ok(())
