@@ -232,6 +232,9 @@ impl SpeedEstimator {
         }
         let silent = self.now.wrapping_sub(self.latest.tick);
         if silent > REST_TICKS {
+            // Time stands still until the next edge: however long the rest is, no edge before it
+            // becomes recent again when the number of ticks wraps.
+            self.now = self.now.wrapping_sub(1);
             return MillimetresPerSecond::default();
         }
         // Waiting for the next edge bounds the speed from above: it is less than a count in

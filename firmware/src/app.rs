@@ -80,9 +80,7 @@ mod app {
     /// Nothing to do: sleeps until an interrupt.
     #[idle]
     fn idle(_: idle::Context) -> ! {
-        loop {
-            cortex_m::asm::wfi();
-        }
+        crate::chip::sleep()
     }
 
     /// The control tick. Deadline: the next tick, 100 µs after the timer's edge; a tick that misses

@@ -48,10 +48,12 @@ unsafe fn NonMaskableInt() -> ! {
     end(&Crash::new(CrashKind::Clock, state))
 }
 
-/// An interrupt that no task serves.
+/// An exception that no task serves: interrupts are counted from 0, the core's own exceptions lie
+/// below (ARMv7-M B1.5.2).
 #[exception]
 unsafe fn DefaultHandler(number: i16) -> ! {
-    end(&Crash::new(CrashKind::StrayInterrupt, number.unsigned_abs().into()))
+    let exception = i32::from(number) + 16;
+    end(&Crash::new(CrashKind::StrayInterrupt, exception.unsigned_abs()))
 }
 
 /// Takes a fresh stack, for the old one may be what broke, and keeps where the core says that it

@@ -13,6 +13,7 @@
 //! tests cut the power at every single write.
 
 mod nor;
+mod writing;
 
 pub use nor::Nor;
 
@@ -20,6 +21,7 @@ use control_core::{Device, Patient};
 use crc::{CRC_32_ISO_HDLC, Crc, Table};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
+use writing::{Writing, checksum};
 
 /// Raised whenever the bytes of a stored record mean something else.
 pub(crate) const LAYOUT_VERSION: u8 = 6;
@@ -96,6 +98,8 @@ pub enum StoreError {
     Full,
     /// The configuration is longer than a cell.
     TooLong,
+    /// The piece is written: called again with the same record, the save goes on.
+    Unfinished,
 }
 
 /// The finding of start-up about a record.
@@ -128,6 +132,7 @@ pub struct Store<F> {
     newest: [Option<Version>; 2],
     next_cell: usize,
     next_sequence: u32,
+    writing: Option<Writing>,
 }
 
 /// The place of a version of a record.
@@ -169,12 +174,13 @@ impl<F: ConfigFlash> Store<F> {
     /// Finds the versions saved last and makes room for the next ones. Erases, so that it may take
     /// seconds.
     pub fn open(flash: F) -> (Self, Stored<Device>, Stored<Patient>) {
-        let mut store = Self { flash, slot: Slot::A, newest: [None; 2], next_cell: 0, next_sequence: 0 };
+        let mut store =
+            Self { flash, slot: Slot::A, newest: [None; 2], next_cell: 0, next_sequence: 0, writing: None };
         let [device_damaged, patient_damaged] = store.find();
         let device = store.stored(Kind::Device, device_damaged);
         let patient = store.stored(Kind::Patient, patient_damaged);
         // Without room the device works as well; saving then says so.
-        let _ = store.make_room();
+        let _ = store.make_room(&mut || true);
         (store, device, patient)
     }
 
@@ -183,64 +189,44 @@ impl<F: ConfigFlash> Store<F> {
         self.flash
     }
 
-    /// Saves the device's part unless it is what was saved last. Takes as long as the flash takes
-    /// for its words; where no cell is left, as long as an erasure.
-    pub fn save_device(&mut self, device: &Device) -> Result<(), StoreError> {
-        self.save(Kind::Device, device)
+    /// Saves the device's part unless it is what was saved last. After each word it asks `goes_on`,
+    /// and leaves the rest for the next call ([`StoreError::Unfinished`]); another record ends it.
+    /// Where no cell is left, it takes as long as an erasure.
+    pub fn save_device(&mut self, device: &Device, goes_on: impl FnMut() -> bool) -> Result<(), StoreError> {
+        self.save(Kind::Device, device, goes_on)
     }
 
     /// Saves the patient's part unless it is what was saved last; as [`Self::save_device`].
-    pub fn save_patient(&mut self, patient: &Patient) -> Result<(), StoreError> {
-        self.save(Kind::Patient, patient)
+    pub fn save_patient(
+        &mut self,
+        patient: &Patient,
+        goes_on: impl FnMut() -> bool,
+    ) -> Result<(), StoreError> {
+        self.save(Kind::Patient, patient, goes_on)
     }
 
-    fn save<T: Serialize>(&mut self, kind: Kind, record: &T) -> Result<(), StoreError> {
+    fn save<T: Serialize>(
+        &mut self,
+        kind: Kind,
+        record: &T,
+        mut goes_on: impl FnMut() -> bool,
+    ) -> Result<(), StoreError> {
         let mut bytes = [0; PAYLOAD_BYTES];
         let payload = &*postcard::to_slice(record, &mut bytes).map_err(|_| StoreError::TooLong)?;
         if self.is_saved(kind, payload) {
             return Ok(());
         }
-        if self.next_cell >= F::CELLS {
-            self.make_room()?;
+        let has_cell = self.next_cell < F::CELLS && self.is_in_one_slot();
+        if !has_cell && self.begun(kind, payload).is_none() {
+            self.make_room(&mut goes_on)?;
         }
-        self.append(kind, payload)
+        self.append(kind, payload, &mut goes_on)
     }
 
     fn is_saved(&mut self, kind: Kind, payload: &[u8]) -> bool {
         let mut bytes = [0; PAYLOAD_BYTES];
         let newest = self.newest[kind as usize];
         newest.is_some_and(|newest| self.read(newest, &mut bytes) == Some(payload))
-    }
-
-    /// Writes the next version of a record to the next cell.
-    fn append(&mut self, kind: Kind, payload: &[u8]) -> Result<(), StoreError> {
-        if self.next_cell >= F::CELLS {
-            return Err(StoreError::Full);
-        }
-        let (cell, sequence) = (self.next_cell, self.next_sequence);
-        // Whatever becomes of it, this cell is used.
-        self.next_cell += 1;
-        self.next_sequence = sequence.wrapping_add(1);
-        self.write(cell, kind, sequence, payload)?;
-        if self.cell(self.slot, cell) != Cell::Whole(kind, sequence) {
-            return Err(StoreError::Flash);
-        }
-        self.newest[kind as usize] = Some(Version { slot: self.slot, cell, sequence });
-        Ok(())
-    }
-
-    fn write(&mut self, cell: usize, kind: Kind, sequence: u32, payload: &[u8]) -> Result<(), StoreError> {
-        let header = MAGIC | u32::from(LAYOUT_VERSION) << 12 | kind.bits() | payload.len() as u32;
-        let (slot, at) = (self.slot, cell * CELL_WORDS);
-        self.flash.program(slot, at, header)?;
-        self.flash.program(slot, at + 1, sequence)?;
-        self.flash.program(slot, at + 2, checksum(header, sequence, payload))?;
-        for (index, chunk) in payload.chunks(4).enumerate() {
-            let mut word = [0xFF; 4];
-            word[..chunk.len()].copy_from_slice(chunk);
-            self.flash.program(slot, at + HEADER_WORDS + index, u32::from_le_bytes(word))?;
-        }
-        self.flash.program(slot, at + CELL_WORDS - 1, COMMITTED)
     }
 
     fn cell(&mut self, slot: Slot, cell: usize) -> Cell {
@@ -346,14 +332,19 @@ impl<F: ConfigFlash> Store<F> {
         })
     }
 
+    /// True if the newest versions are in the slot that is written to.
+    fn is_in_one_slot(&self) -> bool {
+        self.newest.iter().flatten().all(|newest| newest.slot == self.slot)
+    }
+
     /// Brings both records together in one slot with room for more, and leaves the other one blank.
-    fn make_room(&mut self) -> Result<(), StoreError> {
+    /// Called again where it was unfinished, it goes on.
+    fn make_room(&mut self, goes_on: &mut impl FnMut() -> bool) -> Result<(), StoreError> {
         let is_full = self.next_cell + RESERVE_CELLS > F::CELLS;
-        let are_here = self.newest.iter().flatten().all(|newest| newest.slot == self.slot);
-        if is_full && are_here {
+        if is_full && self.is_in_one_slot() {
             let other = self.slot.other();
             self.blank(other)?;
-            (self.slot, self.next_cell) = (other, 0);
+            (self.slot, self.next_cell, self.writing) = (other, 0, None);
         }
         for kind in Kind::ALL {
             if let Some(newest) = self.newest[kind as usize]
@@ -361,7 +352,7 @@ impl<F: ConfigFlash> Store<F> {
             {
                 let mut bytes = [0; PAYLOAD_BYTES];
                 let payload = self.read(newest, &mut bytes).ok_or(StoreError::Flash)?;
-                self.append(kind, payload)?;
+                self.append(kind, payload, goes_on)?;
             }
         }
         self.blank(self.slot.other())
@@ -377,14 +368,6 @@ impl<F: ConfigFlash> Store<F> {
 /// Every cell of both slots.
 fn cells<F: ConfigFlash>() -> impl Iterator<Item = (Slot, usize)> {
     [Slot::A, Slot::B].into_iter().flat_map(|slot| (0..F::CELLS).map(move |cell| (slot, cell)))
-}
-
-fn checksum(header: u32, sequence: u32, payload: &[u8]) -> u32 {
-    let mut digest = CRC.digest();
-    digest.update(&header.to_le_bytes());
-    digest.update(&sequence.to_le_bytes());
-    digest.update(payload);
-    digest.finalize()
 }
 
 #[cfg(test)]

@@ -181,7 +181,7 @@ mod tests {
         let mut device = Device::default();
         for fade_in_ms in [301, 302] {
             device.limits.fade_in_ms = fade_in_ms;
-            assert!(store.save_device(&device).is_ok(), "saved");
+            assert!(store.save_device(&device, || true).is_ok(), "saved");
         }
         let (store, found, _) = Store::open(store.close());
         assert!(found == Stored::Found(device), "the last one that was saved is found");

@@ -13,6 +13,9 @@ pub const FILE_BYTES: usize = 40;
 /// access failed.
 const BUS_ADDRESS_VALID: u32 = 1 << 15;
 
+/// The exception that is the microcontroller's interrupt 0 (ARMv7-M B1.5.2).
+const FIRST_INTERRUPT: u32 = 16;
+
 /// The reason why the program gave up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[repr(u32)]
@@ -21,7 +24,8 @@ pub enum CrashKind {
     Panic = 1,
     /// A fault of the core; the detail is the core's `HFSR`.
     HardFault = 2,
-    /// An interrupt that nothing serves; the detail is its number.
+    /// An exception that nothing serves; the detail is its number (ARMv7-M B1.5.2): below 16 the
+    /// core's own, from there on the microcontroller's interrupts.
     StrayInterrupt = 3,
     /// A task hung; the detail is its number.
     HungTask = 4,
@@ -106,7 +110,13 @@ impl fmt::Display for Crash {
                 }
                 f.write_str(")")?;
             }
-            CrashKind::StrayInterrupt => write!(f, "received interrupt {detail}, which no task serves")?,
+            CrashKind::StrayInterrupt => {
+                match detail.checked_sub(FIRST_INTERRUPT) {
+                    Some(interrupt) => write!(f, "received interrupt {interrupt}")?,
+                    None => write!(f, "received exception {detail} of the core")?,
+                }
+                f.write_str(", which no task serves")?;
+            }
             CrashKind::HungTask => write!(f, "stopped because task {detail} hung")?,
             CrashKind::Clock => f.write_str("lost its crystal: check the board")?,
         }
@@ -155,8 +165,11 @@ mod tests {
         assert!(!without.to_string().contains("0x60000000"), "BFAR holds anything until it is valid");
         let panic = Crash::panic("firmware/src/app.rs", 12).to_string();
         assert!(panic.contains("panicked at line 12 of firmware/src/app.rs"), "{panic}");
-        let stray = Crash::new(CrashKind::StrayInterrupt, 71).to_string();
-        assert!(stray.contains("interrupt 71"), "{stray}");
+        for (exception, name) in [(15, "exception 15 of the core"), (17, "interrupt 1"), (87, "interrupt 71")]
+        {
+            let stray = Crash::new(CrashKind::StrayInterrupt, exception).to_string();
+            assert!(stray.contains(&std::format!("received {name}, which no task serves")), "{stray}");
+        }
         assert!(Crash::new(CrashKind::HungTask, 3).to_string().contains("task 3"));
     }
 }

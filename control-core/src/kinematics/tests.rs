@@ -97,3 +97,27 @@ fn after_a_rest_speed_begins_anew() {
     let speed = speeds.get(1_230).copied().unwrap_or_default();
     assert!((speed - 156.25).abs() < 1.0, "{speed} mm/s, a count a tick");
 }
+
+/// The number of ticks wraps after 119 hours: what is 2^32 ticks old is not recent.
+#[test]
+fn a_rest_of_any_length_ends_without_a_speed() {
+    let scale = Scale::new(I2F30::ONE / 64);
+    for short_of_a_wrap in [0, 5, 200, 990] {
+        let mut estimator = SpeedEstimator::new(SpeedMethod::EdgeTiming, Counts(0));
+        let speed = |estimator: &mut SpeedEstimator, count| estimator.tick(&scale, Counts(count)).0;
+        for tick in 0..5_000 {
+            speed(&mut estimator, tick.min(2_000) / 10);
+        }
+        // As many ticks more as a rest of 2^32, less a few, still has, if each does what this one does.
+        let before = estimator.now;
+        speed(&mut estimator, 200);
+        let a_tick = estimator.now.wrapping_sub(before);
+        let since_the_edge = before.wrapping_sub(estimator.latest.tick);
+        let left = since_the_edge.wrapping_neg().wrapping_sub(short_of_a_wrap + 1);
+        estimator.now = estimator.now.wrapping_add(a_tick.wrapping_mul(left));
+        for tick in 0..short_of_a_wrap + 100 {
+            assert_eq!(speed(&mut estimator, 200), 0, "{tick} ticks after a rest {short_of_a_wrap} short");
+        }
+        assert_eq!(speed(&mut estimator, 201), 0, "one edge alone says nothing: {short_of_a_wrap}");
+    }
+}

@@ -186,8 +186,6 @@ impl NorFlash for Sectors {
                 cortex_m::asm::dsb();
             })?;
         }
-        // Telemetry is at work, not hung: a configuration has a hundred words and more.
-        SHARED.reports.alive(Task::Telemetry);
         Ok(())
     }
 

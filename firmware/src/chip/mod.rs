@@ -13,6 +13,7 @@ mod lamps;
 mod monitors;
 mod outputs;
 mod pin;
+mod sleep;
 mod start;
 mod supply;
 mod tick_timer;
@@ -25,6 +26,7 @@ pub(crate) use lamps::Lamps;
 pub(crate) use monitors::{DriveLines, Line};
 pub(crate) use outputs::{InclinometerPin, Lines, OnChipDac, amplifier_off, converters};
 pub(crate) use pin::{Pin, Placed};
+pub(crate) use sleep::sleep;
 pub(crate) use start::{Begun, Own, Parts, Statics, Wired, own};
 pub(crate) use supply::Supply;
 

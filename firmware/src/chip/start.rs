@@ -129,7 +129,7 @@ impl<W: Wiring> Parts<W> {
         core.DCB.enable_trace();
         core.DWT.enable_cycle_counter();
         // Keeps the core's clock up in sleep: a debugger can read the log then, and the cycle
-        // counter counts on.
+        // counter counts on. What it costs: `sleep`.
         own.debug.cr().modify(|_, w| w.dbg_sleep().set_bit());
 
         let Said { crash, torque, heat } = LAST_WORDS.take();

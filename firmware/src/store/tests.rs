@@ -95,6 +95,25 @@ fn patient(top: i16) -> Patient {
     patient
 }
 
+/// A writer that stops after so many words.
+fn piece(words: usize) -> impl FnMut() -> bool {
+    let mut left = words;
+    move || {
+        left -= 1;
+        left > 0
+    }
+}
+
+/// Saves a device in pieces of so many words.
+fn save_in_pieces(store: &mut Store<&mut Flash>, travel: i16, words: usize) -> Result<(), StoreError> {
+    loop {
+        match store.save_device(&device(travel), piece(words)) {
+            Err(StoreError::Unfinished) => {}
+            ended => return ended,
+        }
+    }
+}
+
 fn load(flash: &mut Flash) -> Stored<Device> {
     Store::open(flash).1
 }
@@ -107,7 +126,7 @@ fn load_both(flash: &mut Flash) -> (Stored<Device>, Stored<Patient>) {
 fn saved(travels: impl IntoIterator<Item = i16>) -> Flash {
     let mut flash = Flash::new();
     for travel in travels {
-        assert_eq!(Store::open(&mut flash).0.save_device(&device(travel)), Ok(()));
+        assert_eq!(Store::open(&mut flash).0.save_device(&device(travel), || true), Ok(()));
     }
     flash
 }
@@ -117,7 +136,7 @@ fn the_last_of_many_is_found_again() {
     let mut flash = Flash::new();
     assert_eq!(load(&mut flash), Stored::None);
     for travel in 10..60 {
-        assert_eq!(Store::open(&mut flash).0.save_device(&device(travel)), Ok(()));
+        assert_eq!(Store::open(&mut flash).0.save_device(&device(travel), || true), Ok(()));
         assert_eq!(load(&mut flash), Stored::Found(device(travel)));
     }
 }
@@ -127,7 +146,7 @@ fn the_same_configuration_costs_no_flash() {
     let mut flash = saved([20]);
     let before = flash.words.clone();
     let (mut store, ..) = Store::open(&mut flash);
-    assert_eq!((0..100).try_for_each(|_| store.save_device(&device(20))), Ok(()));
+    assert_eq!((0..100).try_for_each(|_| store.save_device(&device(20), || true)), Ok(()));
     assert_eq!(flash.words, before);
 }
 
@@ -136,13 +155,49 @@ fn a_full_slot_moves_over_while_it_is_in_use() {
     let mut flash = Flash::new();
     let (mut store, ..) = Store::open(&mut flash);
     for travel in 10..10 + 4 * CELLS as i16 {
-        assert_eq!(store.save_device(&device(travel)), Ok(()));
+        assert_eq!(store.save_device(&device(travel), || true), Ok(()));
     }
     assert_eq!(load(&mut flash), Stored::Found(device(9 + 4 * CELLS as i16)));
 }
 
-/// From every fill of the slot: power lost in the middle of every write of saving, and in every
-/// write and erasure of the start that follows, which is then repeated.
+#[test]
+fn a_save_in_pieces_writes_what_a_whole_one_does() {
+    for fill in 1..3 * CELLS as i16 {
+        let before = saved_with_patient(fill);
+        let mut whole = before.clone();
+        assert_eq!(save_in_pieces(&mut Store::open(&mut whole).0, 50, usize::MAX), Ok(()));
+        for words in [1, 2, 7, CELL_WORDS] {
+            let mut flash = before.clone();
+            assert_eq!(save_in_pieces(&mut Store::open(&mut flash).0, 50, words), Ok(()));
+            assert!(flash.words == whole.words, "{fill}, {words} words at a time");
+        }
+    }
+}
+
+/// An order that is withdrawn while it is being saved.
+#[test]
+fn a_save_that_is_left_unfinished_changes_nothing() {
+    for fill in 1..3 * CELLS as i16 {
+        for words in 1.. {
+            let mut flash = saved_with_patient(fill);
+            let (mut store, ..) = Store::open(&mut flash);
+            if store.save_device(&device(50), piece(words)).is_ok() {
+                assert!(words > 20, "it takes more than a word");
+                break;
+            }
+            assert_eq!(store.save_patient(&patient(2), || true), Ok(()), "{fill}, after {words} words");
+            let old = Stored::Found(device(9 + fill));
+            assert_eq!(
+                load_both(&mut flash),
+                (old, Stored::Found(patient(2))),
+                "{fill}, after {words} words"
+            );
+        }
+    }
+}
+
+/// From every fill of the slot: power lost in the middle of every write of saving, in pieces as
+/// telemetry does, and in every write and erasure of the start that follows, which is then repeated.
 #[test]
 fn losing_power_anywhere_leaves_the_old_or_the_new() {
     let mut cuts = 0;
@@ -153,7 +208,7 @@ fn losing_power_anywhere_leaves_the_old_or_the_new() {
             let mut flash = before.clone();
             let (mut store, ..) = Store::open(&mut flash);
             store.flash.operations_left = operations;
-            let done = store.save_device(&device(50));
+            let done = save_in_pieces(&mut store, 50, 3);
             if done.is_ok() {
                 break;
             }
@@ -171,7 +226,7 @@ fn losing_power_anywhere_leaves_the_old_or_the_new() {
                 flash.operations_left = usize::MAX;
                 assert_eq!(load(&mut flash), found, "{fill} {operations}");
                 let (mut store, ..) = Store::open(&mut flash);
-                assert_eq!(store.save_device(&device(51)), Ok(()));
+                assert_eq!(store.save_device(&device(51), || true), Ok(()));
                 assert_eq!(load(&mut flash), Stored::Found(device(51)));
                 if is_finished {
                     break;
@@ -204,7 +259,7 @@ fn a_damaged_configuration_is_replaced_by_the_next_one() {
     flash.words[0][5] ^= 4;
     let (mut store, stored, _) = Store::open(&mut flash);
     assert_eq!(stored, Stored::Damaged);
-    assert_eq!(store.save_device(&device(40)), Ok(()));
+    assert_eq!(store.save_device(&device(40), || true), Ok(()));
     assert_eq!(load(&mut flash), Stored::Found(device(40)));
 }
 
@@ -215,8 +270,8 @@ fn a_cell_is_laid_out_as_it_always_was() {
     let mut flash = Flash::new();
     let (mut store, ..) = Store::open(&mut flash);
     let (device, patient) = (Device::commissioned_virtual(), Patient::default());
-    store.save_device(&device).unwrap();
-    store.save_patient(&patient).unwrap();
+    store.save_device(&device, || true).unwrap();
+    store.save_patient(&patient, || true).unwrap();
     let words = &flash.words[Slot::A as usize];
     let (mut bytes, mut patients) = ([0; PAYLOAD_BYTES], [0; PAYLOAD_BYTES]);
     let length = postcard::to_slice(&device, &mut bytes).unwrap().len();
@@ -272,9 +327,9 @@ fn a_start_that_finds_room_leaves_flash_alone() {
 /// A store with a patient and then a number of devices.
 fn saved_with_patient(fill: i16) -> Flash {
     let mut flash = Flash::new();
-    assert_eq!(Store::open(&mut flash).0.save_patient(&patient(1)), Ok(()));
+    assert_eq!(Store::open(&mut flash).0.save_patient(&patient(1), || true), Ok(()));
     for travel in 10..10 + fill {
-        assert_eq!(Store::open(&mut flash).0.save_device(&device(travel)), Ok(()));
+        assert_eq!(Store::open(&mut flash).0.save_device(&device(travel), || true), Ok(()));
     }
     flash
 }
@@ -285,7 +340,7 @@ fn records_are_saved_apart_and_move_when_a_slot_is_full() {
         let mut flash = saved_with_patient(fill);
         let both = (Stored::Found(device(9 + fill)), Stored::Found(patient(1)));
         assert_eq!(load_both(&mut flash), both, "{fill}");
-        assert_eq!(Store::open(&mut flash).0.save_patient(&patient(2)), Ok(()));
+        assert_eq!(Store::open(&mut flash).0.save_patient(&patient(2), || true), Ok(()));
         assert_eq!(load_both(&mut flash), (both.0, Stored::Found(patient(2))), "{fill}");
     }
 }
@@ -298,7 +353,7 @@ fn losing_power_during_a_save_leaves_the_other_record_intact() {
             let mut flash = before.clone();
             flash.operations_left = operations;
             let (mut store, ..) = Store::open(&mut flash);
-            let done = store.save_device(&device(50));
+            let done = store.save_device(&device(50), || true);
             flash.operations_left = usize::MAX;
             let (found, patient_found) = load_both(&mut flash);
             assert_eq!(patient_found, Stored::Found(patient(1)), "{fill} {operations}");
@@ -350,10 +405,10 @@ fn a_cell_of_an_earlier_layout_is_not_read_and_not_damage() {
     flash.words[0][CELL_WORDS - 1] = COMMITTED;
     assert_eq!(load_both(&mut flash), (Stored::None, Stored::None));
     let (mut store, ..) = Store::open(&mut flash);
-    store.save_device(&device(20)).unwrap();
+    store.save_device(&device(20), || true).unwrap();
     assert_eq!(load_both(&mut flash), (Stored::Found(device(20)), Stored::None));
     for travel in 21..40 {
-        Store::open(&mut flash).0.save_device(&device(travel)).unwrap();
+        Store::open(&mut flash).0.save_device(&device(travel), || true).unwrap();
         assert_eq!(load(&mut flash), Stored::Found(device(travel)));
     }
 }

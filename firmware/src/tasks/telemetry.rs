@@ -10,7 +10,7 @@ use crate::store::{Store, StoreError};
 use crate::supervision::Task;
 use crate::timing;
 use control_core::event::Fault;
-use control_core::interlock::Interlock;
+use control_core::interlock::{Interlock, Interlocks};
 use control_core::{AnyOrder, LargeOrder, Plan};
 use core::sync::atomic::Ordering::{Acquire, Relaxed};
 use link::codec::MAX_FRAME;
@@ -22,6 +22,9 @@ const FRAME_PACKETS: usize = MAX_FRAME / super::queues::PACKET_BYTES + 1;
 
 /// The byte at which every frame ends.
 const FRAME_END: u8 = 0;
+
+/// The flash has not taken all of the configuration yet.
+struct Unfinished;
 
 /// Telemetry's own state.
 pub struct Telemetry<B: Board> {
@@ -43,6 +46,8 @@ pub struct Telemetry<B: Board> {
     was_open: bool,
     was_ready: bool,
     in_session: bool,
+    /// True if this turn has written its share of a save.
+    has_written: bool,
 }
 
 impl<B: Board> Telemetry<B> {
@@ -72,12 +77,14 @@ impl<B: Board> Telemetry<B> {
             was_open: false,
             was_ready: false,
             in_session: false,
+            has_written: false,
         }
     }
 
     /// One turn: link state, commands, samples, frames.
     pub fn run(&mut self) {
         let entered = B::cycles();
+        self.has_written = false;
         self.watch_link();
         self.endpoint.set_ahead(self.ahead());
         // Samples first: whether torque is on decides what a command may do.
@@ -113,7 +120,9 @@ impl<B: Board> Telemetry<B> {
     }
 
     fn take_commands(&mut self) {
-        self.endpoint.set_interlocks(self.shared.conditions.get());
+        // A start that follows a configuration waits behind it.
+        let saving = Interlocks::of(Interlock::Saving);
+        self.endpoint.set_interlocks(Interlocks(self.shared.conditions.get().0 & !saving.0));
         while let Some(packet) = self.ends.from_pc.dequeue() {
             self.endpoint.receive(&packet);
             if self.endpoint.take_stop() {
@@ -158,8 +167,11 @@ impl<B: Board> Telemetry<B> {
             let order = match order {
                 AnyOrder::Small(order) => Some(order),
                 AnyOrder::Large(large) => {
-                    if let LargeOrder::Configure(plan) = &large {
-                        self.save(plan);
+                    if let LargeOrder::Configure(plan) = &large
+                        && self.save(plan).is_err()
+                    {
+                        self.held = Some(large.into());
+                        return;
                     }
                     let _ = self.ends.large_orders.enqueue(large);
                     None
@@ -181,30 +193,39 @@ impl<B: Board> Telemetry<B> {
 
     /// Each part outlives a reset; one that has not changed costs no flash. The link takes no
     /// configuration while torque is on or a start is on its way, and while it is being saved the
-    /// tick gives none: an erasure stops the processor.
-    fn save(&mut self, plan: &Plan) {
+    /// tick gives none: an erasure stops the processor. A turn writes for its share of time only,
+    /// for the tilt task waits meanwhile.
+    fn save(&mut self, plan: &Plan) -> Result<(), Unfinished> {
         debug_assert!(!self.shared.is_powered(), "the link refuses it");
+        if self.has_written {
+            return Err(Unfinished);
+        }
         self.shared.conditions.set(Interlock::Saving, true);
         let saved = self.save_parts(plan);
-        self.shared.conditions.set(Interlock::Saving, false);
-        let Err(error) = saved else { return };
-        let error = match error {
-            StoreError::Full => SaveError::Full,
-            StoreError::Flash => SaveError::Flash,
-            StoreError::TooLong => SaveError::TooLong,
+        self.has_written = saved == Err(StoreError::Unfinished);
+        self.shared.conditions.set(Interlock::Saving, self.has_written);
+        let error = match saved {
+            Ok(()) => return Ok(()),
+            Err(StoreError::Unfinished) => return Err(Unfinished),
+            Err(StoreError::Full) => SaveError::Full,
+            Err(StoreError::Flash) => SaveError::Flash,
+            Err(StoreError::TooLong) => SaveError::TooLong,
         };
         log::warn!("the configuration was not saved: {}", error as u8);
         self.endpoint.not_saved(self.next_tick, error);
+        Ok(())
     }
 
     fn save_parts(&mut self, plan: &Plan) -> Result<(), StoreError> {
+        let began = B::cycles();
+        let goes_on = || B::cycles().wrapping_sub(began) < timing::SAVE_CYCLES;
         let (device, patient) = (link::codec::hash(plan.device()), link::codec::hash(plan.patient()));
         if device != self.saved.0 {
-            self.store.save_device(plan.device())?;
+            self.store.save_device(plan.device(), goes_on)?;
             self.saved.0 = device;
         }
         if patient != self.saved.1 {
-            self.store.save_patient(plan.patient())?;
+            self.store.save_patient(plan.patient(), goes_on)?;
             self.saved.1 = patient;
         }
         Ok(())

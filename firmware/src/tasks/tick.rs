@@ -200,12 +200,12 @@ impl<B: Board> Tick<B> {
 
     /// Counts a code that came after the converter's instant. One by itself is a delay of a tick;
     /// many make a wall softer than it is calculated to be, so they are counted, sent to the PC and
-    /// shown.
+    /// shown. A converter without such an instant gives the code out late, and `delay_us` counts on
+    /// these 20 µs with every converter.
     #[cold]
     #[inline(never)]
     fn late_code(&self) {
-        // Only the converter of 12 bits has such an instant.
-        if self.is_saving() || self.width != DacWidth::BITS_12 {
+        if self.is_saving() {
             return;
         }
         self.shared.late_codes.store(self.shared.late_codes.load(Relaxed).saturating_add(1), Relaxed);

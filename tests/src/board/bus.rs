@@ -18,6 +18,11 @@ pub(super) const DAC: (u64, u64, u64) = (0x4000_7400, 0x400, 0x4010_0000);
 /// The same for the external interrupt controller.
 pub(super) const EXTI: (u64, u64, u64) = (0x4001_3C00, 0x400, 0x4011_0000);
 
+/// Returns the instructions for which there was time in so many nanoseconds.
+fn stalled(nanos: u64) -> u64 {
+    nanos * (INSTRUCTIONS_PER_SECOND / 1_000_000) / 1_000
+}
+
 fn window(address: u64) -> u64 {
     for (base, size, window) in [OTG, DAC, EXTI] {
         if (base..base + size).contains(&address) {
@@ -43,8 +48,8 @@ pub(super) struct Rerouted<'a> {
     pub(super) bus: &'a mut dyn CoreBus,
     pub(super) flash: &'a Flash,
     pub(super) stalled: u64,
-    /// Instructions' time for which the flash, being erased, has kept the core waiting in this
-    /// stretch.
+    /// Instructions' time for which the flash, being erased or programmed, has kept the core
+    /// waiting in this stretch.
     pub(super) standstill: u64,
     pub(super) shorted: Option<PartPin>,
     pub(super) identity: Option<u32>,
@@ -66,7 +71,7 @@ impl CoreBus for Rerouted<'_> {
             let (address, value) = (access.address, access.value as u32);
             let mut array = self.flash.array();
             if written {
-                array.store(address, access.width.bytes(), value);
+                self.standstill += stalled(array.store(address, access.width.bytes(), value));
                 return Some(access.value);
             }
             let word = u64::from(array.word(address)) | u64::from(array.word(address + 4)) << 32;
@@ -78,7 +83,7 @@ impl CoreBus for Rerouted<'_> {
         if written {
             let at = self.bus.time(access.instruction_count + self.stalled).0;
             let stall = self.flash.array().register_written(access.address, access.value as u32, at);
-            self.standstill += stall * (INSTRUCTIONS_PER_SECOND / 1_000_000) / 1_000;
+            self.standstill += stalled(stall);
         }
         let address = access.address;
         self.code_written |= written && address == CONVERTER_CODE;

@@ -52,7 +52,8 @@ pub fn instructions(bytes: &[u8], is_it: impl Fn([u8; 4]) -> bool) -> Vec<u32> {
 }
 
 /// The bytes of the code from `address` on.
-fn code(bytes: &[u8], address: u32) -> Option<&[u8]> {
+#[must_use]
+pub fn code(bytes: &[u8], address: u32) -> Option<&[u8]> {
     const PROGRAM: u32 = 1;
     let sections = sections(bytes)?;
     let holds = |section: &&[u32; 5]| {
@@ -81,22 +82,40 @@ pub fn exits(bytes: &[u8], symbols: &[Symbol], address: u32) -> Vec<u32> {
         let function = symbols.iter().find(|symbol| symbol.address == entry && symbol.size > 0);
         let (Some(function), false) = (function, seen.contains(&entry)) else { continue };
         seen.push(entry);
-        let Some(code) = code(bytes, entry) else { continue };
-        let mut at = 0;
-        while let (true, Some(first)) = (at < function.size, half(code, at as usize)) {
-            let second = half(code, at as usize + 2).unwrap_or(0);
-            let is_long = first >= 0xE800;
-            let place = entry + at;
+        for (place, first, second) in body(bytes, entry, function.size) {
             match (first, second) {
                 (0x4770 | 0xBD00..=0xBDFF, _) => exits.push(place),
                 (0xE8BD, 0x8000..) | (0xF85D, 0xFB04) => exits.push(place),
                 (0xF000..=0xF7FF, _) if second & 0xD000 == 0x9000 => open.push(branch(place, first, second)),
                 _ => {}
             }
-            at += if is_long { 4 } else { 2 };
         }
     }
     exits
+}
+
+/// Returns the addresses of the instructions that wait for an interrupt or an event, `wfi` and `wfe`
+/// (ARMv7-M manual, A7.7: `bf30`, `bf20`; `f3af 8003`, `f3af 8002`).
+#[must_use]
+pub fn waits(bytes: &[u8], symbols: &[Symbol]) -> Vec<u32> {
+    let functions = symbols.iter().filter(|symbol| symbol.size > 0);
+    let all = functions.flat_map(|function| body(bytes, function.address, function.size));
+    let waits = all.filter(|&(_, first, second)| {
+        matches!((first, second), (0xBF30 | 0xBF20, _) | (0xF3AF, 0x8003 | 0x8002))
+    });
+    waits.map(|(place, ..)| place).collect()
+}
+
+/// Returns the instructions of the function at `address`, none where there is no code: the place of
+/// each, its first half and the half after that.
+fn body(bytes: &[u8], address: u32, size: u32) -> Vec<(u32, u16, u16)> {
+    let Some(code) = code(bytes, address) else { return vec![] };
+    let (mut body, mut at) = (vec![], 0);
+    while let (true, Some(first)) = (at < size, half(code, at as usize)) {
+        body.push((address + at, first, half(code, at as usize + 2).unwrap_or(0)));
+        at += if first >= 0xE800 { 4 } else { 2 };
+    }
+    body
 }
 
 /// Returns the target of the long branch at `place`: `b.w`, encoding T4.

@@ -5,8 +5,8 @@
 //! bit goes from one to zero only. `LOCK` is set out of reset and a write with it set locks
 //! whatever else it says (3.9.7); `STRT` in a locked register does nothing and reports nothing.
 //! While a sector is erased the core gets no instruction from the flash (3.6: "any attempt to read
-//! … causes the bus to stall"): for its whole time nothing runs, the watchdog excepted. The
-//! interface's registers stay the emulator's; this model watches what is written to them.
+//! … causes the bus to stall"): for its whole time nothing runs, the watchdog excepted. The same
+//! holds for the time in which it takes a word. The interface's registers stay the emulator's; this model watches what is written to them.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -46,6 +46,9 @@ const fn erase_nanos(parallel_bytes: u32) -> u64 {
         _ => 1_000_000_000,
     }
 }
+/// The time in which the array takes a byte, half a word or a word: typical, and at most (DS8626,
+/// flash memory programming, t_prog).
+pub const PROGRAM_NANOS: [u64; 2] = [16_000, 100_000];
 /// The first sector of 128 KiB and the number it has; smaller ones hold the program.
 const FIRST_LARGE: u64 = 0x0802_0000;
 const FIRST_LARGE_NUMBER: u64 = 5;
@@ -86,6 +89,8 @@ pub struct Array {
     pub(super) cut: bool,
     /// True if it no longer accepts what is programmed: an array at the end of its life.
     pub worn: bool,
+    /// The time in which it takes what is programmed, one of [`PROGRAM_NANOS`].
+    pub program_nanos: u64,
     /// The firmware's actions against the rules.
     pub violations: Vec<String>,
 }
@@ -107,6 +112,7 @@ impl Default for Array {
             cut_before: None,
             cut: false,
             worn: false,
+            program_nanos: PROGRAM_NANOS[0],
             violations: Vec::new(),
         }
     }
@@ -160,16 +166,17 @@ impl Array {
         self.cut = false;
     }
 
-    /// A store of the firmware to the array.
-    pub(super) fn store(&mut self, address: u64, bytes: u32, value: u32) {
+    /// A store of the firmware to the array. Returns the time for which the core then stalls, in
+    /// nanoseconds.
+    pub(super) fn store(&mut self, address: u64, bytes: u32, value: u32) -> u64 {
         let is_open = self.control & (LOCK | PG) == PG && Some(bytes) == self.parallel();
         if !is_open || !address.is_multiple_of(bytes.into()) {
             self.violations
                 .push(format!("a store of {bytes} bytes to {address:#010x} with CR {:#x}", self.control));
-            return;
+            return 0;
         }
         if !self.powered() || self.worn {
-            return;
+            return 0;
         }
         let before = self.word(address);
         let shift = 8 * (address & 3) as u32;
@@ -179,6 +186,7 @@ impl Array {
             self.violations.push(format!("{address:#010x}: {before:#x} can't become {value:#x}"));
         }
         self.words.insert(address & !3, before & (value | !mask));
+        self.program_nanos
     }
 
     /// Bytes at a time, where the supply is enough for so many.

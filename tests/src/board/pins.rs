@@ -15,6 +15,7 @@ pub(super) mod register {
     pub(in super::super) const MODE: u64 = 0x00;
     pub(in super::super) const PULLS: u64 = 0x0C;
     pub(in super::super) const INPUT: u64 = 0x10;
+    pub(in super::super) const OUTPUT: u64 = 0x14;
     pub(in super::super) const FUNCTION_LOW: u64 = 0x20;
     pub(in super::super) const FUNCTION_HIGH: u64 = 0x24;
 }
@@ -60,6 +61,9 @@ pub struct Pins {
     pub drive_lines: [PartPin; 3],
     /// The lamps: running, torque is on, a fault.
     pub lamps: [PartPin; 3],
+    /// The switch of the 5 V of the board's USB connector, for a host, and the level that switches
+    /// them on.
+    pub usb_power: (PartPin, bool),
     /// The strap that says that an analogue inclinometer is fitted, where it is a matter of choice.
     pub strap: Option<PartPin>,
     /// The inclinometer's channel of the converters.
@@ -78,6 +82,7 @@ pub const DISCOVERY: Pins = Pins {
     encoder_supply: PartPin::new('E', 7),
     drive_lines: [PartPin::new('E', 4), PartPin::new('E', 5), PartPin::new('E', 6)],
     lamps: [PartPin::new('D', 12), PartPin::new('D', 13), PartPin::new('D', 14)],
+    usb_power: (PartPin::new('C', 0), false),
     strap: Some(PartPin::new('B', 1)),
     inclinometer: 11,
     monitor: 12,
@@ -93,6 +98,7 @@ pub const NUCLEO_F429ZI: Pins = Pins {
     encoder_supply: PartPin::new('E', 7),
     drive_lines: [PartPin::new('F', 14), PartPin::new('F', 15), PartPin::new('F', 12)],
     lamps: [PartPin::new('B', 0), PartPin::new('B', 7), PartPin::new('B', 14)],
+    usb_power: (PartPin::new('G', 6), true),
     strap: None,
     inclinometer: 10,
     monitor: 12,

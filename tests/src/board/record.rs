@@ -38,5 +38,5 @@ impl ConfigFlash for Cells<'_> {
 /// The default device, commissioned.
 pub(super) fn commission(array: &mut Array) {
     let (mut store, ..) = Store::open(Cells(array));
-    store.save_device(&Device::commissioned_virtual()).expect("a blank array has room");
+    store.save_device(&Device::commissioned_virtual(), || true).expect("a blank array has room");
 }

@@ -313,6 +313,7 @@ impl World {
                         self.watch_strap(at, address, value);
                         self.tracks.register_written(session, at, address);
                         self.watch_enable(session, at);
+                        self.watch_usb_power(session, at, address);
                         self.watch_output(session, at);
                         self.pause(session);
                     }

@@ -61,6 +61,40 @@ fn a_wild_pointer_names_its_instruction_and_its_address() {
     }
 }
 
+/// Stores `value` to both addresses, as a stray write that makes an exception pending.
+fn stray_write(rig: &mut Rig, addresses: [u32; 2], value: u32) -> Effect {
+    // `ldr r0, [pc, #8]`, `ldr r1, [pc, #12]`, `str r1, [r0]`, `ldr r0, [pc, #12]`, `str r1, [r0]`, `b .`,
+    // what they load.
+    let program = [0x4903_4802, 0x4803_6001, 0xE7FE_6001, addresses[0], value, addresses[1]];
+    rig.board.at_stop(move |stopped| {
+        for (at, word) in (BEYOND..).step_by(4).zip(program) {
+            assert!(stopped.set_word(at.into(), word), "memory for a program");
+        }
+    });
+    Effect::Jump(BEYOND)
+}
+
+/// The core's `PendSV` is exception 14, two below interrupt 0; interrupt 2 is the tamper's (ARMv7-M
+/// B1.5.2, RM0090 12.2). Nothing here serves either.
+#[test]
+fn an_exception_and_an_interrupt_are_distinguished() {
+    const ICSR: u32 = 0xE000_ED04;
+    const PENDSVSET: u32 = 1 << 28;
+    const ISER0: u32 = 0xE000_E100;
+    const ISPR0: u32 = 0xE000_E200;
+    let strays = [
+        ([ICSR, ICSR], PENDSVSET, 14, "exception 14 of the core"),
+        ([ISER0, ISPR0], 1 << 2, 18, "interrupt 2,"),
+    ];
+    for (addresses, value, exception, name) in strays {
+        let mut rig = Rig::pressed();
+        let effect = stray_write(&mut rig, addresses, value);
+        let crash = record_of(&mut rig, task::TILT, effect);
+        assert_eq!((crash.kind, crash.detail), (CrashKind::StrayInterrupt, exception));
+        assert!(crash.to_string().contains(name), "{crash}");
+    }
+}
+
 #[test]
 fn a_jump_to_nowhere_names_the_place() {
     let mut rig = Rig::pressed();

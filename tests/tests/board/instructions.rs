@@ -15,8 +15,6 @@ use control_core::units::{
 };
 use fixed::types::{I8F24, I16F16};
 use link::Command;
-use tests::board::ToCode;
-use tests::board::cache;
 use tests::board::plant::{self, PlantSide};
 use tests::board::{Board, MILLISECOND, Nanos, Wiring};
 use tests::laws;
@@ -25,11 +23,9 @@ use tests::rig::Rig;
 use tests::scenario::{COUNTS_PER_MM, venepuncture};
 
 /// The tick's interrupt handler.
-const TICK: &str = "TIM4";
+pub(super) const TICK: &str = "TIM4";
 /// The limit for a tick of the default patient without compensation: five per cent of its cycles.
-/// The converter is latched after 3,360.
 const LONGEST: u32 = 840;
-const LATCH_CYCLES: u32 = 3_360;
 /// The same of six walls that are all met, and of excitations.
 const HEAVIEST: u32 = 1_100;
 const EXCITING: u32 = 910;
@@ -40,7 +36,7 @@ const COMPENSATED: u32 = 1_260;
 const WORKING: [State; 5] =
     [State::Approach, State::Elastic, State::Puncture, State::Friction, State::Withdrawal];
 /// The time at which the hand begins to move.
-const BEGIN: Nanos = 200 * MILLISECOND;
+pub(super) const BEGIN: Nanos = 200 * MILLISECOND;
 
 /// The instructions of each tick by what the tick was doing.
 #[derive(Default)]
@@ -169,7 +165,7 @@ fn heaviest(apart: f64) -> impl Iterator<Item = Config> {
 }
 
 /// As much as can be fed forward.
-fn all_fed_forward() -> Compensation {
+pub(super) fn all_fed_forward() -> Compensation {
     let wave = |number: usize, amplitude: f64| Wave {
         order: 5 * number as u16 + 3,
         amplitude: q(amplitude),
@@ -191,7 +187,7 @@ fn all_fed_forward() -> Compensation {
 }
 
 /// Points of a path: a time in ms after [`BEGIN`] and a depth in counts.
-fn path(points: impl IntoIterator<Item = (f64, i64)>) -> Vec<(Nanos, i64)> {
+pub(super) fn path(points: impl IntoIterator<Item = (f64, i64)>) -> Vec<(Nanos, i64)> {
     points.into_iter().map(|(ms, counts)| (BEGIN + (ms * 1e6) as Nanos, counts)).collect()
 }
 
@@ -209,40 +205,6 @@ fn a_tick_takes_at_most_840_instructions() {
     println!("tick_instructions_longest={longest}");
     assert!(longest <= LONGEST, "a tick of {longest} instructions");
     assert!(2 * used <= size, "more than half of the stack was used: {used} of {size} bytes");
-}
-
-/// RM0090 3.5.2: the tick's code is more than the flash's cache holds, and other tasks have used
-/// the cache since the tick before. With every line of code from the flash, without prefetch, and
-/// one and a half cycles for an instruction, the code is written before the converter takes it.
-/// Takes more than 5 s: each instruction of 18,000 ticks by itself.
-#[test]
-fn a_tick_whose_code_is_not_cached_is_done_before_the_latch() {
-    for (name, compensation) in [("default", Compensation::NONE), ("all fed forward", all_fed_forward())] {
-        let mut config = Config::commissioned_virtual();
-        config.device.compensation = compensation;
-        let Rig { mut board, mut pc } = Rig::connected(Wiring::default(), venepuncture(BEGIN));
-        pc.configure(&mut board, &config);
-        pc.must(&mut board, Command::Index(Some(17)));
-        pc.must(&mut board, Command::Start);
-        // Through the skin, and its wall gives way.
-        let end = BEGIN + 2_600 * MILLISECOND;
-        pc.run_ms(&mut board, 1_600);
-        board.count_lines_of(TICK);
-        while board.now() < end {
-            pc.run_ms(&mut board, 1);
-        }
-        let runs = board.counted_runs();
-        let cycles = |part: &ToCode| part.instructions * 3 / 2 + part.lines * cache::WAIT_CYCLES;
-        let worst = runs.iter().filter_map(|run| run.to_code).max_by_key(cycles).expect("ticks");
-        println!(
-            "| {name}, nothing cached | {} instructions, {} lines from the flash, {} of {LATCH_CYCLES} cycles |",
-            worst.instructions,
-            worst.lines,
-            cycles(&worst)
-        );
-        assert!(worst.lines > 64, "more lines than the cache has");
-        assert!(cycles(&worst) < LATCH_CYCLES, "{worst:?}");
-    }
 }
 
 #[test]

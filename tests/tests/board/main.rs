@@ -1,10 +1,12 @@
 //! The properties of the flash image, on the emulated boards. One program, because each further one
 //! would generate the emulator's code again.
 
+mod cold_cache;
 mod commissioning;
 mod compensation;
 mod control;
 mod crash;
+mod edges;
 mod excitations;
 mod faults;
 mod fitted;

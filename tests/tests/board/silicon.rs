@@ -9,10 +9,11 @@ use fixed::types::{I8F24, I16F16};
 use link::Command;
 use link::frames::{CommandRefusal, EventKind, SaveError, Stage};
 use tests::board::flash::{FACTORY_OPTIONS, GUARDED_OPTIONS};
+use tests::board::pins::{DISCOVERY, NUCLEO_F429ZI};
 use tests::board::wires::Wires;
-use tests::board::{Board, MILLISECOND, Wiring, elf, firmware_path, plant};
+use tests::board::{Board, MILLISECOND, Wiring, elf, firmware_path, image_for, plant};
 use tests::rig::Rig;
-use tests::scenario::board;
+use tests::scenario::{board, board_wired};
 
 fn is_allowed(board: &mut Board) {
     let violations = board.at_stop(|stopped| stopped.violations());
@@ -185,7 +186,8 @@ fn a_part_from_the_factory_gets_its_brown_out_reset_once() {
     assert_eq!(why, CommandRefusal::Interlocked(Interlock::Supply));
 }
 
-/// UM1472: PC0 low would switch the 5 V of CN5 on, against the PC that feeds it.
+/// UM1472: PC0 low would switch the 5 V of CN5 on, against the PC that feeds it, be it for the
+/// microsecond from its mode to its level; so would PG6 high on the other board (UM1974).
 #[test]
 fn the_boards_own_usb_power_stays_off() {
     const GPIOC_ODR: u64 = 0x4002_0814;
@@ -193,6 +195,26 @@ fn the_boards_own_usb_power_stays_off() {
     board.run_ms(50);
     let output = board.at_stop(|stopped| stopped.register(GPIOC_ODR)).expect("a register");
     assert!(output & 1 != 0, "{output:#x}");
+    is_allowed(&mut board);
+    let mut board = board_wired(Wiring::nucleo_f429zi(), plant::held());
+    board.run_ms(50);
+    is_allowed(&mut board);
+}
+
+/// ES0182 2.1.3: with `DBG_SLEEP` set, a core that wakes from a `wfi` or `wfe` in flash may carry out
+/// what it never fetched. In RAM, with three `NOP`s behind it, it does not.
+#[test]
+fn no_image_waits_in_flash() {
+    const RAM: std::ops::Range<u32> = 0x2000_0000..0x2003_0000;
+    /// `wfi` and three `nop`.
+    const SLEEP: [u8; 8] = [0x30, 0xBF, 0x00, 0xBF, 0x00, 0xBF, 0x00, 0xBF];
+    for pins in [DISCOVERY, NUCLEO_F429ZI] {
+        let image = std::fs::read(image_for(&pins)).expect("an image");
+        let waits = elf::waits(&image, &elf::symbols(&image));
+        assert!(waits.len() == 1 && RAM.contains(&waits[0]), "{}: {waits:#x?}", pins.image);
+        let code = elf::code(&image, waits[0]).expect("its bytes");
+        assert_eq!(code.get(..8), Some(&SLEEP[..]), "{}", pins.image);
+    }
 }
 
 /// RM0090 8.3.9, DS8626: a pull of 40 kΩ takes its time.

@@ -3,9 +3,12 @@
 use control_core::event::Fault;
 use control_core::{Config, Device};
 use link::Command;
+use link::crash::CrashKind;
+use tests::board::flash::PROGRAM_NANOS;
 use tests::board::{Board, Wiring, plant};
+use tests::laws;
 use tests::pc::Pc;
-use tests::rig::Rig;
+use tests::rig::{Rig, task};
 
 /// A configuration that differs from the default.
 fn changed() -> Config {
@@ -94,6 +97,60 @@ fn power_lost_before_each(step: usize) {
         seen[0], seen[1], seen[2]
     );
     assert!(seen[0] > 0 && seen[1] > 0);
+}
+
+/// The largest patient, and a device that differs, on their way into a flash that takes its time.
+fn saving(nanos: u64) -> (Rig, Config) {
+    let mut rig = Rig::zeroed(Wiring::default());
+    rig.board.flash().array().program_nanos = nanos;
+    let mut config = laws::phantom();
+    config.device.limits.fade_in_ms = 333;
+    rig.pc.configure(&mut rig.board, &config);
+    (rig, config)
+}
+
+/// DS8626: half a word takes 16 µs, and 100 µs at most. Tilt has the lowest priority and 11 ms.
+#[test]
+fn a_save_leaves_every_task_its_time() {
+    for nanos in PROGRAM_NANOS {
+        let (mut rig, config) = saving(nanos);
+        let before = rig.board.flash().array().operations;
+        rig.pc.run_ms(&mut rig.board, 300);
+        let writes = rig.board.flash().array().operations - before;
+        let resets = rig.board.at_stop(|stopped| stopped.resets());
+        println!("| {nanos} ns for half a word | {writes} of them after the answer |");
+        assert!(resets.is_empty(), "{nanos} ns for half a word: {resets:?}");
+        let violations = rig.board.at_stop(|stopped| stopped.violations());
+        assert!(violations.is_empty(), "{violations:?}");
+        let found = hash_after_reset(&mut rig.board, &mut rig.pc);
+        assert_eq!(found, (link::codec::hash(&config), None), "{nanos} ns for half a word");
+    }
+}
+
+/// The PC was told that both parts are in force.
+#[test]
+fn a_save_outlives_the_pc_that_asked_for_it() {
+    let (mut rig, config) = saving(PROGRAM_NANOS[1]);
+    rig.board.at_stop(|stopped| stopped.usb().host.close());
+    rig.board.run_ms(300);
+    let found = hash_after_reset(&mut rig.board, &mut rig.pc);
+    assert_eq!(found, (link::codec::hash(&config), None));
+}
+
+#[test]
+fn a_task_that_hangs_during_a_save_is_found() {
+    for (task, number) in [(task::TELEMETRY, 2), (task::TILT, 3)] {
+        let (mut rig, _) = saving(PROGRAM_NANOS[1]);
+        let hang = rig.hang();
+        rig.upset(task, hang);
+        rig.board.run_ms(60);
+        assert_eq!(rig.board.at_stop(|stopped| stopped.resets().len()), 1, "the watchdog ends it");
+        rig.wait_for_port();
+        rig.pc.connect(&mut rig.board);
+        rig.pc.run_ms(&mut rig.board, 20);
+        let crash = rig.pc.heard.crash.0.clone().map(|crash| (crash.kind, crash.detail));
+        assert_eq!(crash, Some((CrashKind::HungTask, number)));
+    }
 }
 
 #[test]

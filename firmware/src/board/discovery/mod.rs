@@ -26,7 +26,7 @@ use embedded_hal_bus::spi::{ExclusiveDevice, NoDelay};
 use firmware::drive::Drive;
 use firmware::tilt::{Accelerometer, Inclinometer, Reading, TiltSource};
 use firmware::timing;
-use stm32f4xx_hal::gpio::{Analog, Output, PA5, PA6, PA7, PC1, PD7, PE3};
+use stm32f4xx_hal::gpio::{Analog, Output, PA5, PA6, PA7, PC1, PD7, PE3, PinState};
 use stm32f4xx_hal::pac;
 use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::rcc::Rcc;
@@ -59,7 +59,8 @@ impl Wiring for Discovery {
         // The amplifier before anything else: off, then zero torque.
         let enable = chip::amplifier_off(gpiod.pd7);
         gpiod.pd4.into_push_pull_output().set_low();
-        gpioc.pc0.into_push_pull_output().set_high();
+        // High before it is an output: low switches the host's 5 V on.
+        gpioc.pc0.into_push_pull_output_in_state(PinState::High);
         let drive = Drive::new(chip::converters!(device, gpioa, gpioe, rcc), enable);
 
         let strap = gpiob.pb1.into_pull_down_input();

@@ -49,6 +49,7 @@ pub(super) struct World {
     pub(super) outgoing: RefCell<Vec<Vec<u8>>>,
     pub(super) room: Cell<usize>,
     pub(super) flash_fails: Cell<bool>,
+    pub(super) program_cycles: Cell<u32>,
     pub(super) lamps: Cell<(bool, bool)>,
 }
 
@@ -249,6 +250,7 @@ impl ConfigFlash for Words {
             return Err(StoreError::Flash);
         }
         self.0[slot as usize][index] &= word;
+        world().cycles.set(world().cycles.get().wrapping_add(world().program_cycles.get()));
         Ok(())
     }
 

@@ -5,10 +5,11 @@ use super::super::shared::{LINK_CONFIGURED, LINK_READY, Shared};
 use super::super::telemetry::Telemetry;
 use super::fake::{Fake, Part, Words, ends, plan, shared, world};
 use crate::store::{CELL_WORDS, ConfigFlash, Store};
+use crate::timing;
 use control_core::controller::TickInput;
 use control_core::event::{Fault, State};
 use control_core::interlock::Interlock;
-use control_core::{Controller, Device, Order};
+use control_core::{Controller, Device, LargeOrder, Order, Patient};
 use core::sync::atomic::Ordering::Relaxed;
 use link::Command;
 use link::codec::MAX_FRAME;
@@ -134,6 +135,36 @@ fn a_configuration_is_saved_without_torque_or_reported_failed() {
         "{frames:?}"
     );
     assert!(desk.tick.large_orders.dequeue().is_some(), "it is in force all the same");
+}
+
+/// The flash takes its time; what was ordered after a configuration waits behind it, and of a PC that
+/// has gone its configurations alone are carried out.
+#[test]
+fn a_save_takes_many_turns_and_outlives_its_pc() {
+    let mut config = Device::commissioned_virtual();
+    config.limits.fade_in_ms = 444;
+    for is_gone in [false, true] {
+        let mut desk = Desk::in_session();
+        assert_eq!(desk.answer(Command::Zero), Ok(()));
+        while desk.tick.orders.dequeue().is_some() {}
+        world().program_cycles.set(timing::SAVE_CYCLES / 3);
+        assert_eq!(desk.answer(Command::ConfigureDevice(config)), Ok(()));
+        assert_eq!(desk.answer(Command::ConfigurePatient(Patient::nobody())), Ok(()));
+        assert_eq!(desk.answer(Command::Start), Ok(()), "it waits");
+        desk.shared.link.store(if is_gone { 0 } else { LINK_CONFIGURED | LINK_READY }, Relaxed);
+        let (mut turns, mut orders, mut plans) = (0, Vec::new(), Vec::new());
+        for _ in 0..200 {
+            turns += u32::from(desk.shared.conditions.get().contains(Interlock::Saving));
+            desk.turn();
+            orders.extend(core::iter::from_fn(|| desk.tick.orders.dequeue()).map(|queued| queued.order));
+            plans.extend(core::iter::from_fn(|| desk.tick.large_orders.dequeue()));
+        }
+        assert!((20..200).contains(&turns), "{turns} turns of three words each");
+        let has_started = orders.iter().any(|order| matches!(order, Some(Order::Start)));
+        assert_eq!((has_started, orders.len()), (!is_gone, if is_gone { 1 } else { 3 }));
+        let Some(LargeOrder::Configure(plan)) = plans.last() else { panic!("a plan") };
+        assert_eq!((plan.device(), plan.patient()), (&config, &Patient::nobody()));
+    }
 }
 
 #[test]

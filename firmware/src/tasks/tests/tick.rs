@@ -10,6 +10,14 @@ use control_core::{Device, LargeOrder, Order, Patient, Plan};
 use core::sync::atomic::Ordering::Relaxed;
 use std::vec::Vec;
 
+/// As telemetry passes on the plan of a device with the converter of 8 bits.
+fn configure_eight_bits(telemetry: &mut TelemetryEnds) {
+    let eight = Device { dac: DacWidth::BITS_8, ..Device::commissioned_virtual() };
+    let eight = Plan::new(&eight, &Patient::default()).unwrap();
+    assert!(telemetry.large_orders.enqueue(LargeOrder::Configure(eight)).is_ok());
+    assert!(telemetry.orders.enqueue(Queued { stops: 0, order: None }).is_ok());
+}
+
 #[test]
 fn no_start_from_before_a_stop_gives_torque() {
     let (mut tick, shared, mut telemetry) = tick();
@@ -44,21 +52,15 @@ fn the_tick_does_not_start_under_an_interlock_and_says_why() {
 #[test]
 fn the_tick_takes_a_trip_at_once_and_a_plan_only_without_torque() {
     let (mut tick, shared, mut telemetry) = tick();
-    let eight = Device { dac: DacWidth::BITS_8, ..Device::commissioned_virtual() };
-    let eight = Plan::new(&eight, &Patient::default()).unwrap();
-    let configure = |telemetry: &mut TelemetryEnds| {
-        assert!(telemetry.large_orders.enqueue(LargeOrder::Configure(eight.clone())).is_ok());
-        assert!(telemetry.orders.enqueue(Queued { stops: 0, order: None }).is_ok());
-    };
     order(&mut telemetry, 0, Order::Start);
     run(&mut tick, shared, 2);
-    configure(&mut telemetry);
+    configure_eight_bits(&mut telemetry);
     run(&mut tick, shared, 2);
     assert_eq!(tick.width(), DacWidth::BITS_12, "torque is on");
     shared.trips.raise(Fault::Tilt);
     run(&mut tick, shared, 1);
     assert!(!world().enabled.get());
-    configure(&mut telemetry);
+    configure_eight_bits(&mut telemetry);
     run(&mut tick, shared, 2);
     assert_eq!(tick.width(), DacWidth::BITS_8);
 }
@@ -99,16 +101,20 @@ fn a_tick_that_comes_late_is_counted_and_takes_torque_away() {
 
 #[test]
 fn a_code_written_after_the_latch_is_counted() {
-    let (mut tick, shared, _) = tick();
+    let (mut tick, shared, mut telemetry) = tick();
     world().since_edge.set(timing::OUTPUT_CYCLES - 1);
     run(&mut tick, shared, 2);
     assert_eq!(shared.late_codes.load(Relaxed), 0);
     world().since_edge.set(timing::OUTPUT_CYCLES);
     run(&mut tick, shared, 3);
     assert_eq!(shared.late_codes.load(Relaxed), 3);
+    configure_eight_bits(&mut telemetry);
+    run(&mut tick, shared, 3);
+    assert_eq!(tick.width(), DacWidth::BITS_8);
+    assert_eq!(shared.late_codes.load(Relaxed), 6, "without a latch it is late all the same");
     shared.conditions.set(Interlock::Saving, true);
     run(&mut tick, shared, 1);
-    assert_eq!(shared.late_codes.load(Relaxed), 3, "an erasure stops the processor");
+    assert_eq!(shared.late_codes.load(Relaxed), 6, "an erasure stops the processor");
 }
 
 /// After 119 hours the number of ticks begins again; a tick that is missed then is missed.
