@@ -2,6 +2,7 @@
 //! judged by what was sent, what was answered and when the enable line changed.
 
 use control_core::compensation::Gains;
+use control_core::event::Fault;
 use control_core::excitation::{Excitation, Servo, Signal};
 use control_core::units::{Damping, Millimetres, MillimetresPerSecond, Stiffness};
 use fixed::types::{I8F24, I16F16};
@@ -240,4 +241,24 @@ fn a_stop_that_is_answered_holds() {
     );
     assert!(faults.is_empty(), "{} of {streams}:\n{}", faults.len(), faults.join("\n"));
     assert!(100 * without_torque.len() as u64 <= streams, "no torque after {without_torque:?}");
+}
+
+/// Ten emergency stops, each released again, and a program that does nothing but send Start.
+#[test]
+fn a_program_that_only_starts_gets_no_torque_after_a_fault() {
+    let mut rig = Rig::pressed();
+    let since = rig.board.now();
+    let refused = Err(CommandRefusal::Faulted(Fault::EmergencyStop));
+    for _ in 0..10 {
+        rig.board.at_stop(|stopped| stopped.set_emergency_stop(true));
+        rig.pc.run_ms(&mut rig.board, 10);
+        rig.board.at_stop(|stopped| stopped.set_emergency_stop(false));
+        rig.pc.run_ms(&mut rig.board, 10);
+        assert_eq!(rig.pc.command(&mut rig.board, Command::Start).result, refused);
+    }
+    assert_eq!(rig.pc.must_not(&mut rig.board, Command::Clear), CommandRefusal::NotStopped);
+    assert!(rig.enabled_since(since).is_empty());
+    rig.pc.must(&mut rig.board, Command::Start);
+    rig.pc.run_ms(&mut rig.board, 5);
+    assert_eq!(rig.enabled_since(since).len(), 1, "a person has cleared it");
 }
