@@ -46,8 +46,10 @@ pub struct Telemetry<B: Board> {
     was_open: bool,
     was_ready: bool,
     in_session: bool,
-    /// True if this turn has written its share of a save.
-    has_written: bool,
+    /// The millisecond in which it last wrote to the flash.
+    written_ms: u32,
+    /// CRC-32 of both parts of the configuration that is being saved.
+    saving: Option<(u32, u32)>,
 }
 
 impl<B: Board> Telemetry<B> {
@@ -77,14 +79,14 @@ impl<B: Board> Telemetry<B> {
             was_open: false,
             was_ready: false,
             in_session: false,
-            has_written: false,
+            written_ms: u32::MAX,
+            saving: None,
         }
     }
 
     /// One turn: link state, commands, samples, frames.
     pub fn run(&mut self) {
         let entered = B::cycles();
-        self.has_written = false;
         self.watch_link();
         self.endpoint.set_ahead(self.ahead());
         // Samples first: whether torque is on decides what a command may do.
@@ -193,33 +195,38 @@ impl<B: Board> Telemetry<B> {
 
     /// Each part outlives a reset; one that has not changed costs no flash. The link takes no
     /// configuration while torque is on or a start is on its way, and while it is being saved the
-    /// tick gives none: an erasure stops the processor. A turn writes for its share of time only,
-    /// for the tilt task waits meanwhile.
+    /// tick gives none: an erasure stops the processor. A millisecond has its share of
+    /// time for it, however often telemetry runs, for the tilt task waits meanwhile.
     fn save(&mut self, plan: &Plan) -> Result<(), Unfinished> {
         debug_assert!(!self.shared.is_powered(), "the link refuses it");
-        if self.has_written {
+        let hashes = *self
+            .saving
+            .get_or_insert_with(|| (link::codec::hash(plan.device()), link::codec::hash(plan.patient())));
+        let ms = self.shared.supervised_ms.load(Relaxed);
+        if hashes != self.saved && ms == self.written_ms {
             return Err(Unfinished);
         }
+        self.written_ms = ms;
         self.shared.conditions.set(Interlock::Saving, true);
-        let saved = self.save_parts(plan);
-        self.has_written = saved == Err(StoreError::Unfinished);
-        self.shared.conditions.set(Interlock::Saving, self.has_written);
-        let error = match saved {
-            Ok(()) => return Ok(()),
+        let error = match self.save_parts(plan, hashes) {
             Err(StoreError::Unfinished) => return Err(Unfinished),
-            Err(StoreError::Full) => SaveError::Full,
-            Err(StoreError::Flash) => SaveError::Flash,
-            Err(StoreError::TooLong) => SaveError::TooLong,
+            Ok(()) => None,
+            Err(StoreError::Full) => Some(SaveError::Full),
+            Err(StoreError::Flash) => Some(SaveError::Flash),
+            Err(StoreError::TooLong) => Some(SaveError::TooLong),
         };
-        log::warn!("the configuration was not saved: {}", error as u8);
-        self.endpoint.not_saved(self.next_tick, error);
+        self.saving = None;
+        self.shared.conditions.set(Interlock::Saving, false);
+        if let Some(error) = error {
+            log::warn!("the configuration was not saved: {}", error as u8);
+            self.endpoint.not_saved(self.next_tick, error);
+        }
         Ok(())
     }
 
-    fn save_parts(&mut self, plan: &Plan) -> Result<(), StoreError> {
+    fn save_parts(&mut self, plan: &Plan, (device, patient): (u32, u32)) -> Result<(), StoreError> {
         let began = B::cycles();
         let goes_on = || B::cycles().wrapping_sub(began) < timing::SAVE_CYCLES;
-        let (device, patient) = (link::codec::hash(plan.device()), link::codec::hash(plan.patient()));
         if device != self.saved.0 {
             self.store.save_device(plan.device(), goes_on)?;
             self.saved.0 = device;

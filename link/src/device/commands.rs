@@ -13,17 +13,25 @@ use core::borrow::BorrowMut;
 
 /// True if the command is only for a device whose torque is off.
 fn needs_torque_off(command: &Command) -> bool {
+    makes_plan(command)
+        || matches!(
+            command,
+            Command::Zero
+                | Command::Excite(_)
+                | Command::Index(_)
+                | Command::Segment { .. }
+                | Command::Play { .. }
+        )
+}
+
+/// True if the command makes another plan, which takes long.
+fn makes_plan(command: &Command) -> bool {
     matches!(
         command,
         Command::ConfigurePatient(_)
             | Command::ConfigureDevice(_)
             | Command::RestoreDevice(_)
             | Command::Commission
-            | Command::Zero
-            | Command::Excite(_)
-            | Command::Index(_)
-            | Command::Segment { .. }
-            | Command::Play { .. }
     )
 }
 
@@ -60,6 +68,9 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
         let has_torque = self.powered || self.start_ordered || self.ahead.is_on || self.ahead.start_waits;
         if has_torque && needs_torque_off(&command) {
             return Err(CommandRefusal::Powered);
+        }
+        if makes_plan(&command) && self.waiting.borrow().orders.is_full() {
+            return Err(CommandRefusal::Full);
         }
         if gives_torque(&command) {
             self.is_later_than_stop(id)?;

@@ -59,10 +59,6 @@ fn a_tick_whose_code_is_not_cached_is_done_before_the_latch() {
     let counts = |mm: i64| mm * COUNTS_PER_MM;
     let moves = [(0.0, 0), (50.0, counts(-2)), (100.0, counts(20)), (120.0, counts(20)), (170.0, counts(38))];
     let out = [(190.0, counts(38)), (300.0, counts(-2))];
-    let mut phantom = laws::phantom();
-    for (name, compensation) in [("xr", None), ("xr, all fed forward", Some(all_fed_forward()))] {
-        phantom.device.compensation = compensation.unwrap_or(phantom.device.compensation);
-        let hand = plant::by_hand(plant::eased(path(moves.into_iter().chain(out))));
-        is_done_before_the_latch(name, &phantom, hand, [50, 320]);
-    }
+    let hand = plant::by_hand(plant::eased(path(moves.into_iter().chain(out))));
+    is_done_before_the_latch("xr", &laws::phantom(), hand, [50, 320]);
 }

@@ -6,7 +6,6 @@ mod commissioning;
 mod compensation;
 mod control;
 mod crash;
-mod edges;
 mod excitations;
 mod faults;
 mod fitted;

@@ -16,13 +16,14 @@ use tests::rig::Rig;
 
 /// Streams of the test; `STREAMS` in the environment is another number, and `FIRST` the first seed.
 const STREAMS: u64 = 300;
-/// A stop is answered within this time, and the amplifier is off this long after the answer.
+/// A stop is answered within this time, and as much more for each configuration that was sent before
+/// it and was not answered yet; the amplifier is off this long after the answer.
 const ANSWER: Nanos = 2 * MILLISECOND;
 const OFF: Nanos = MILLISECOND;
 /// The PC looks for answers this often.
 const LOOK: Nanos = 100_000;
-/// A start that is answered with yes gives torque within this time, where nothing takes it away.
-const ON: Nanos = 3 * MILLISECOND;
+/// All configurations of a stream are saved within this time. The longest record takes 20 ms.
+const SAVED: Nanos = 300 * MILLISECOND;
 
 /// SplitMix64 (Steele et al. 2014).
 struct Random(u64);
@@ -47,6 +48,8 @@ enum Kind {
     Stop,
     /// It turns the amplifier on.
     Start,
+    /// The device plans and saves for a while, with torque off: while it is on it refuses at once.
+    Configure,
     Other,
 }
 
@@ -78,6 +81,7 @@ fn kind(command: &Command) -> Kind {
     match command {
         Command::Stop => Kind::Stop,
         Command::Start | Command::Excite(_) | Command::Play { .. } => Kind::Start,
+        Command::ConfigurePatient(_) | Command::RestoreDevice(_) | Command::Commission => Kind::Configure,
         _ => Kind::Other,
     }
 }
@@ -152,16 +156,22 @@ impl Stream {
         }
     }
 
-    /// Sends a command and waits for its answer.
+    /// Sends a command until it is carried out or refused for good: a device that saves is busy.
     fn ask(&mut self, command: Command) -> Result<(), CommandRefusal> {
-        let place = self.send(command);
-        for _ in 0..200 {
-            self.run_to(self.rig.board.now() + LOOK);
-            if let Some((_, ack)) = self.sent[place].answer {
-                return ack.result;
+        let end = self.rig.board.now() + SAVED;
+        loop {
+            let place = self.send(command.clone());
+            while self.sent[place].answer.is_none() {
+                assert!(self.rig.board.now() < end, "no answer");
+                self.run_to(self.rig.board.now() + LOOK);
+            }
+            match self.sent[place].answer {
+                Some((at, Ack { result: Err(CommandRefusal::Full), .. })) if at < end => {
+                    self.run_to(at + MILLISECOND);
+                }
+                answer => return answer.map_or(Ok(()), |(_, ack)| ack.result),
             }
         }
-        panic!("no answer within 20 ms");
     }
 
     /// Returns the times from which and to which the amplifier was on.
@@ -181,9 +191,12 @@ impl Stream {
     /// Returns what a stop of the stream has done wrong.
     fn fault(&mut self) -> Option<String> {
         let on = self.on();
-        for stop in self.sent.iter().filter(|sent| sent.kind == Kind::Stop) {
+        for (place, stop) in self.sent.iter().enumerate().filter(|(_, sent)| sent.kind == Kind::Stop) {
             let Some((answered, ack)) = stop.answer else { return Some(format!("{stop:?} has no answer")) };
-            if ack.result.is_err() || answered > stop.at + ANSWER + LOOK {
+            let waits =
+                |sent: &&Sent| sent.kind == Kind::Configure && sent.answer.is_none_or(|(at, _)| at > stop.at);
+            let before = self.sent[..place].iter().filter(waits).count() as u64;
+            if ack.result.is_err() || answered > stop.at + (1 + before) * ANSWER + LOOK {
                 return Some(format!("{stop:?} is answered late, or refused"));
             }
             let off = answered + OFF;
@@ -203,20 +216,20 @@ impl Stream {
         None
     }
 
-    /// Stops, clears, starts: true if there is torque.
+    /// Stops, clears, starts: true if there is torque, once the device has saved what it was given.
     fn gives_torque(&mut self) -> bool {
-        self.run_to(self.rig.board.now() + 40 * MILLISECOND);
         for command in [Command::Hello { version: PROTOCOL_VERSION }, Command::Stop] {
             assert_eq!(self.ask(command), Ok(()));
         }
         self.run_to(self.rig.board.now() + MILLISECOND);
         for command in [Command::Clear, Command::Zero, Command::Start] {
-            if self.ask(command).is_err() {
+            if let Err(refusal) = self.ask(command) {
+                println!("no torque: {refusal:?}");
                 return false;
             }
         }
-        self.run_to(self.rig.board.now() + ON);
-        self.rig.board.at_stop(|stopped| stopped.drive().enabled)
+        let end = self.rig.board.now() + SAVED;
+        self.rig.board.run_until_seen(end, LOOK, |stopped| stopped.drive().enabled)
     }
 }
 

@@ -137,9 +137,11 @@ fn a_save_outlives_the_pc_that_asked_for_it() {
     assert_eq!(found, (link::codec::hash(&config), None));
 }
 
+/// Telemetry that hangs keeps tilt waiting: whichever of the two has been silent for too long first
+/// is named.
 #[test]
 fn a_task_that_hangs_during_a_save_is_found() {
-    for (task, number) in [(task::TELEMETRY, 2), (task::TILT, 3)] {
+    for (task, names) in [(task::TELEMETRY, 2..=3), (task::TILT, 3..=3)] {
         let (mut rig, _) = saving(PROGRAM_NANOS[1]);
         let hang = rig.hang();
         rig.upset(task, hang);
@@ -148,8 +150,8 @@ fn a_task_that_hangs_during_a_save_is_found() {
         rig.wait_for_port();
         rig.pc.connect(&mut rig.board);
         rig.pc.run_ms(&mut rig.board, 20);
-        let crash = rig.pc.heard.crash.0.clone().map(|crash| (crash.kind, crash.detail));
-        assert_eq!(crash, Some((CrashKind::HungTask, number)));
+        let crash = rig.pc.heard.crash.0.clone().expect("a record");
+        assert!(crash.kind == CrashKind::HungTask && names.contains(&crash.detail), "{crash}");
     }
 }
 

@@ -57,8 +57,9 @@ impl Desk {
         id
     }
 
-    /// One run of the task, and what it said.
+    /// One run of the task, a millisecond after the last, and what it said.
     fn turn(&mut self) -> Vec<DeviceFrame> {
+        self.shared.supervised_ms.fetch_add(1, Relaxed);
         self.telemetry.run();
         let packets: Vec<Packet> = core::iter::from_fn(|| self.usb.to_pc.dequeue()).collect();
         packets.iter().flatten().filter_map(|&byte| self.reception.push(byte)).collect()
