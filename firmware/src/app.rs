@@ -8,7 +8,7 @@
 // RTIC takes priorities as literals only: these hold them to the ones that `timing` explains.
 const _: () = {
     use firmware::timing::priority::{SUPERVISOR, SUPPLY, TELEMETRY, TICK, TILT, USB};
-    assert!(TICK == 16 && SUPPLY == 15 && SUPERVISOR == 4 && USB == 3 && TELEMETRY == 2 && TILT == 1);
+    assert!(TICK == 16 && SUPPLY == 15 && SUPERVISOR == 4 && USB == 3 && TILT == 2 && TELEMETRY == 1);
 };
 
 #[rtic::app(device = stm32f4xx_hal::pac, peripherals = true)]
@@ -114,13 +114,13 @@ mod app {
 
     /// Commands in, orders out; samples in, frames out. On the interrupt of a serial port that is
     /// not used.
-    #[task(binds = USART2, priority = 2, local = [telemetry])]
+    #[task(binds = USART2, priority = 1, local = [telemetry])]
     fn telemetry(context: telemetry::Context) {
         context.local.telemetry.run();
     }
 
     /// Reads the tilt sensor. On the interrupt of a serial port that is not used.
-    #[task(binds = USART3, priority = 1, local = [tilt])]
+    #[task(binds = USART3, priority = 2, local = [tilt])]
     fn tilt(context: tilt::Context) {
         context.local.tilt.run();
     }

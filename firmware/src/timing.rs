@@ -99,9 +99,12 @@ pub(crate) const TILT_FROZEN_MEASUREMENTS: u32 = 50;
 /// less.
 pub const TILT_SPI_HZ: u32 = 1_500_000;
 
-/// Telemetry's share of its millisecond for a save: 0.4 ms. The word under way may end 0.2 ms later
-/// (data sheet: half a word takes 16 µs, 100 µs at most), and the tilt task, which waits meanwhile,
-/// still has a third of each millisecond.
+/// After this time in a turn telemetry takes no further packet: 0.3 ms. The command under way may end
+/// 2 ms later.
+pub(crate) const COMMAND_CYCLES: u32 = CORE_HZ / 3_300;
+
+/// Telemetry's share of a millisecond for a save: 0.4 ms. The word under way may end 0.2 ms later
+/// (data sheet: half a word takes 16 µs, 100 µs at most), and a stop is answered in between.
 pub(crate) const SAVE_CYCLES: u32 = CORE_HZ / 2_500;
 
 /// Longest time in which the configuration's flash takes half a word (data sheet: 100 µs), in turns
@@ -127,10 +130,10 @@ pub mod priority {
     pub const SUPERVISOR: u8 = 4;
     /// USB.
     pub const USB: u8 = 3;
-    /// Telemetry.
-    pub const TELEMETRY: u8 = 2;
-    /// Tilt.
-    pub const TILT: u8 = 1;
+    /// Tilt: 50 µs of every 5 ms.
+    pub const TILT: u8 = 2;
+    /// Telemetry, which works for as long as a PC gives it work.
+    pub const TELEMETRY: u8 = 1;
 }
 
 #[cfg(test)]

@@ -298,6 +298,7 @@ fn a_patient_never_changes_the_device_but_may_be_dismissed() {
     device.limits.torque.0 = fixed::types::I16F16::from_num(2);
     let told = hello(&ask(&mut bench, Command::ConfigureDevice(device)));
     assert_eq!(told.config_hash, hash(device, Patient::nobody()));
+    bench.run(1, |_| 0);
     assert!(matches!(
         bench.send(Command::ConfigurePatient(Patient::default())),
         Err(CommandRefusal::Config(_))

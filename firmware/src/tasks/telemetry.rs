@@ -91,7 +91,7 @@ impl<B: Board> Telemetry<B> {
         self.endpoint.set_ahead(self.ahead());
         // Samples first: whether torque is on decides what a command may do.
         self.take_samples();
-        self.take_commands();
+        self.take_commands(entered);
         self.send_frames();
         self.lamps.show(self.shared.is_powered(), self.endpoint.fault().is_some());
         self.shared.reports.alive(Task::Telemetry);
@@ -121,7 +121,9 @@ impl<B: Board> Telemetry<B> {
         self.was_ready = is_ready;
     }
 
-    fn take_commands(&mut self) {
+    /// Commands that take long, as a configuration does with 2 ms, end the turn: what comes after them
+    /// has the next one, so that telemetry reports between them.
+    fn take_commands(&mut self, entered: u32) {
         // A start that follows a configuration waits behind it.
         let saving = Interlocks::of(Interlock::Saving);
         self.endpoint.set_interlocks(Interlocks(self.shared.conditions.get().0 & !saving.0));
@@ -134,6 +136,10 @@ impl<B: Board> Telemetry<B> {
             }
             self.forward_orders();
             self.endpoint.set_ahead(self.ahead());
+            if B::cycles().wrapping_sub(entered) >= timing::COMMAND_CYCLES {
+                B::wake_telemetry();
+                break;
+            }
         }
         B::allow_usb(true);
         self.forward_orders();
@@ -196,7 +202,7 @@ impl<B: Board> Telemetry<B> {
     /// Each part outlives a reset; one that has not changed costs no flash. The link takes no
     /// configuration while torque is on or a start is on its way, and while it is being saved the
     /// tick gives none: an erasure stops the processor. A millisecond has its share of
-    /// time for it, however often telemetry runs, for the tilt task waits meanwhile.
+    /// time for it, however often telemetry runs.
     fn save(&mut self, plan: &Plan) -> Result<(), Unfinished> {
         debug_assert!(!self.shared.is_powered(), "the link refuses it");
         let hashes = *self

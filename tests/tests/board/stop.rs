@@ -162,7 +162,8 @@ impl Stream {
         loop {
             let place = self.send(command.clone());
             while self.sent[place].answer.is_none() {
-                assert!(self.rig.board.now() < end, "no answer");
+                let resets = self.rig.board.at_stop(|stopped| stopped.resets().to_vec());
+                assert!(resets.is_empty() && self.rig.board.now() < end, "{resets:?}: {:?}", self.sent);
                 self.run_to(self.rig.board.now() + LOOK);
             }
             match self.sent[place].answer {
