@@ -27,11 +27,13 @@ pub enum Interlock {
     NotCommissioned = 6,
     /// Nobody has said where depth 0 is since the last reset.
     NotZeroed = 7,
+    /// The tilt sensor is absent, stuck or answers nonsense, or has not measured yet.
+    TiltSensor = 8,
 }
 
 impl Interlock {
     /// All of them, each at the place of its number.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Supply,
         Self::EmergencyStop,
         Self::AmplifierNotReady,
@@ -40,6 +42,7 @@ impl Interlock {
         Self::Saving,
         Self::NotCommissioned,
         Self::NotZeroed,
+        Self::TiltSensor,
     ];
 
     /// The fault that it is where torque is on.
@@ -50,7 +53,8 @@ impl Interlock {
             Self::AmplifierNotReady => Fault::AmplifierNotReady,
             Self::AmplifierStuckOn => Fault::AmplifierStuckOn,
             Self::EncoderWire => Fault::EncoderWire,
-            // Nobody begins to save while torque is on; the last two keep a device from being
+            Self::TiltSensor => Fault::Tilt,
+            // Nobody begins to save while torque is on; the other two keep a device from being
             // started and come at no other time.
             Self::Saving | Self::NotCommissioned | Self::NotZeroed => Fault::Overrun,
         }
@@ -74,6 +78,9 @@ impl fmt::Display for Interlock {
             Self::Saving => "the configuration is being saved; try again in two seconds",
             Self::NotCommissioned => "the device has not been commissioned; run host-sim commission first",
             Self::NotZeroed => "the depth is unknown since the device was switched on; hold the tip on the skin and press Zero depth here",
+            Self::TiltSensor => {
+                "the tilt sensor does not measure; check its wires, or replace the board if the sensor is on it"
+            }
         })
     }
 }

@@ -2,10 +2,11 @@
 
 use control_core::Config;
 use control_core::event::{Fault, Limits};
+use control_core::interlock::Interlock;
 use control_core::units::MillinewtonMetres;
 use fixed::types::I16F16;
 use link::Command;
-use link::frames::EventKind;
+use link::frames::{CommandRefusal, EventKind};
 use tests::board::tilt::{Health, Model};
 use tests::board::{Effect, MILLISECOND, Nanos, Wiring, plant};
 use tests::rig::{PRESSED, Rig, task};
@@ -69,6 +70,27 @@ fn an_accelerometer_that_is_stuck() {
     tilt_fault(Model::Lis302dl, Health::Stuck, 120 * MILLISECOND);
     tilt_fault(Model::Lis3dsh, Health::Stuck, 120 * MILLISECOND);
     tilt_fault(Model::Lis3dsh, Health::Frozen, 600 * MILLISECOND);
+}
+
+/// A sensor that does not measure gives no torque, not even for the milliseconds of a fault.
+#[test]
+fn a_start_with_a_dead_tilt_sensor_is_refused() {
+    for health in [Health::Absent, Health::Nonsense, Health::Stuck, Health::Frozen] {
+        let mut rig = Rig::zeroed(Wiring::default());
+        let becomes = |rig: &mut Rig, health| {
+            rig.board.at_stop(move |stopped| stopped.tilt().expect("an accelerometer").health = health);
+            rig.pc.run_ms(&mut rig.board, 700);
+        };
+        becomes(&mut rig, health);
+        let since = rig.board.now();
+        let answer = rig.pc.command(&mut rig.board, Command::Start).result;
+        rig.pc.run_ms(&mut rig.board, 50);
+        let on = rig.enabled_since(since);
+        assert!(on.is_empty(), "{health:?}: answered {answer:?}, the amplifier on at {on:?}");
+        assert_eq!(answer, Err(CommandRefusal::Interlocked(Interlock::TiltSensor)), "{health:?}");
+        becomes(&mut rig, Health::Good);
+        rig.pc.must(&mut rig.board, Command::Start);
+    }
 }
 
 /// It answers as before, and is in power-down: it needs its configuration again, and the device
