@@ -29,11 +29,15 @@ pub enum Interlock {
     NotZeroed = 7,
     /// The tilt sensor is absent, stuck or answers nonsense, or has not measured yet.
     TiltSensor = 8,
+    /// The encoder's supply was sensed at commissioning, and is not.
+    EncoderSupplyUnsensed = 9,
+    /// The motor's current was measured at commissioning, and is not.
+    CurrentUnmeasured = 10,
 }
 
 impl Interlock {
     /// All of them, each at the place of its number.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 11] = [
         Self::Supply,
         Self::EmergencyStop,
         Self::AmplifierNotReady,
@@ -43,6 +47,8 @@ impl Interlock {
         Self::NotCommissioned,
         Self::NotZeroed,
         Self::TiltSensor,
+        Self::EncoderSupplyUnsensed,
+        Self::CurrentUnmeasured,
     ];
 
     /// The fault that it is where torque is on.
@@ -54,9 +60,13 @@ impl Interlock {
             Self::AmplifierStuckOn => Fault::AmplifierStuckOn,
             Self::EncoderWire => Fault::EncoderWire,
             Self::TiltSensor => Fault::Tilt,
-            // Nobody begins to save while torque is on; the other two keep a device from being
-            // started and come at no other time.
-            Self::Saving | Self::NotCommissioned | Self::NotZeroed => Fault::Overrun,
+            // Nobody begins to save while torque is on; the others keep a device from being started
+            // and come at no other time.
+            Self::Saving
+            | Self::NotCommissioned
+            | Self::NotZeroed
+            | Self::EncoderSupplyUnsensed
+            | Self::CurrentUnmeasured => Fault::Overrun,
         }
     }
 }
@@ -80,6 +90,12 @@ impl fmt::Display for Interlock {
             Self::NotZeroed => "the depth is unknown since the device was switched on; hold the tip on the skin and press Zero depth here",
             Self::TiltSensor => {
                 "the tilt sensor does not measure; check its wires, or replace the board if the sensor is on it"
+            }
+            Self::EncoderSupplyUnsensed => {
+                "the encoder's supply was sensed at commissioning and is not now; check its sense wire and the encoder's plug, or commission again without it"
+            }
+            Self::CurrentUnmeasured => {
+                "the motor's current was measured at commissioning and is not now; check the monitor's wires and switch the board off and on, or commission again without it"
             }
         })
     }

@@ -117,6 +117,7 @@ impl<B: Board> Telemetry<B> {
 
     fn take_commands(&mut self) {
         self.endpoint.set_interlocks(self.shared.conditions.get());
+        self.endpoint.set_fitted(self.shared.fitted());
         while let Some(packet) = self.ends.from_pc.dequeue() {
             self.endpoint.receive(&packet);
             self.forward_orders();

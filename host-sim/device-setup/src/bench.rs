@@ -132,7 +132,9 @@ impl<'a> Bench<'a> {
     /// at what its own pulses have shown. Its record.
     pub async fn commission(&mut self, device: &Device) -> Result<Record, Error> {
         self.driver.commission();
-        self.becomes(&Device { commissioned: true, ..*device }).await
+        // The device knows itself which sensors it has.
+        let sensors = self.device().await?.sensors;
+        self.becomes(&Device { commissioned: true, sensors, ..*device }).await
     }
 
     /// Checks that what was asked for makes the device `wanted`, and that it stays so.

@@ -4,7 +4,7 @@ use super::{Endpoint, Waiting};
 use crate::commissioning::{Proof, may_become};
 use crate::frames::{Ack, Command, CommandRefusal, HostFrame, PROTOCOL_VERSION};
 use control_core::compensation::check::check;
-use control_core::config::Device;
+use control_core::config::{Device, Sensors};
 use control_core::excitation::Excitation;
 use control_core::interlock::Interlock;
 use control_core::units::Counts;
@@ -28,6 +28,12 @@ fn needs_torque_off(command: &Command) -> bool {
 }
 
 impl<W: BorrowMut<Waiting>> Endpoint<W> {
+    /// Sets the optional sensors that are there. A device whose record names one that is not does
+    /// not start; where nobody looks, as on a virtual device, it does.
+    pub fn set_fitted(&mut self, fitted: Sensors) {
+        self.fitted = Some(fitted);
+    }
+
     pub(super) fn command(&mut self, frame: HostFrame) {
         if matches!(frame.command, Command::Hello { .. }) {
             // A PC that starts anew may use old ids again.
@@ -75,7 +81,9 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
                 self.configure_device(&record.device)
             }
             Command::Commission => {
-                let device = Device { commissioned: true, ..*self.plan.device() };
+                let device = self.plan.device();
+                let sensors = self.fitted.unwrap_or(device.sensors);
+                let device = Device { commissioned: true, sensors, ..*device };
                 if !self.proof.is_shown() {
                     may_become(self.plan.device(), &device)?;
                 }
@@ -160,7 +168,9 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
         if !self.in_session {
             return Err(CommandRefusal::NoSession);
         }
-        self.interlocks.first().map_or(Ok(()), |interlock| Err(CommandRefusal::Interlocked(interlock)))
+        let missing = self.fitted.and_then(|fitted| self.plan.device().sensors.missing_in(fitted));
+        let interlock = self.interlocks.first().or(missing);
+        interlock.map_or(Ok(()), |interlock| Err(CommandRefusal::Interlocked(interlock)))
     }
 
     /// A patient for another device leaves; what is wrong with the device itself is wrong without a

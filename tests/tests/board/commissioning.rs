@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 use std::time::Duration;
 
 use control_core::Device;
-use control_core::config::SafetyConfig;
+use control_core::config::{SafetyConfig, Sensors};
 use control_core::event::State;
 use control_core::excitation::{Excitation, GENTLE_TORQUE, Servo, Signal};
 use control_core::interlock::Interlock;
@@ -17,6 +17,7 @@ use fixed::types::I16F16;
 use lab::commission::bench::{Act, Line};
 use lab::commission::{CommissioningOutcome, Wish, commission};
 use link::Command;
+use link::commissioning::Record;
 use link::frames::CommandRefusal;
 use tests::board::wires::{Wire, Wires};
 use tests::board::{Board, Wiring, plant};
@@ -96,6 +97,56 @@ fn a_board_without_a_record_starts_only_once_it_is_commissioned() {
     assert_eq!(pc.must_not(&mut board, Command::Start), CommandRefusal::Interlocked(Interlock::NotZeroed));
     pc.must(&mut board, Command::Zero);
     pc.must(&mut board, Command::Start);
+}
+
+/// A board whose sensor came off would go on without the protection that it was commissioned with.
+#[test]
+fn a_sensor_that_came_off_since_commissioning_prevents_a_start() {
+    const ALL: Sensors = Sensors { encoder_supply: true, current: true };
+    let needle = Needle::held_at(0.0);
+    needle.change(|state| state.hand = None);
+    let wiring =
+        Wiring { commissioned: false, supply_sense: true, current_monitor: true, ..Wiring::default() };
+    let mut board = board_wired(wiring, needle.plant());
+    let mut pc = Pc::new();
+    pc.connect(&mut board);
+    pc.must(&mut board, ramps(GENTLE_TORQUE, 0.0));
+    pc.run_ms(&mut board, 600);
+    pc.must(&mut board, Command::Commission);
+    let start_with = |board: &mut Board, pc: &mut Pc, fitted, command: Option<Command>| {
+        board.at_stop(move |stopped| {
+            stopped.set_fitted(fitted);
+            stopped.reset_by_pin();
+        });
+        board.run_ms(20);
+        pc.connect(board);
+        pc.run_ms(board, 200);
+        pc.must(board, Command::Zero);
+        command.into_iter().for_each(|command| pc.must(board, command));
+        let answer = pc.command(board, Command::Start).result;
+        pc.must(board, Command::Stop);
+        pc.run_ms(board, 50);
+        answer
+    };
+    let refused = |interlock| Err(CommandRefusal::Interlocked(interlock));
+    for (fitted, wanted) in [
+        (Sensors { current: false, ..ALL }, refused(Interlock::CurrentUnmeasured)),
+        (ALL, Ok(())),
+        (Sensors { encoder_supply: false, ..ALL }, refused(Interlock::EncoderSupplyUnsensed)),
+    ] {
+        assert_eq!(start_with(&mut board, &mut pc, fitted, None), wanted, "{fitted:?}");
+    }
+    pc.must(&mut board, Command::ReportDevice);
+    pc.run_ms(&mut board, 50);
+    let record = pc.heard.record.expect("the device's record");
+    assert_eq!(record.device.sensors, ALL, "it is in the record");
+    // A command does not make it forget one; a record of its own of before does.
+    let old = Device { sensors: Sensors::default(), ..record.device };
+    let sealed = Record::of(&old, pc.heard.hello.as_ref().expect("a hello").identity);
+    let claimed = pc.must_not(&mut board, Command::ConfigureDevice(old));
+    assert_eq!(claimed, CommandRefusal::Commissioned(Field::Sensors));
+    let restored = Some(Command::RestoreDevice(sealed));
+    assert_eq!(start_with(&mut board, &mut pc, Sensors::default(), restored), Ok(()));
 }
 
 #[test]

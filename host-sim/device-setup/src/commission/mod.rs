@@ -6,6 +6,7 @@ pub mod findings;
 
 use crate::bench::{Act, Bench, Line, ticks};
 use control_core::compensation::Compensation;
+use control_core::config::Sensors;
 use control_core::event::Fault;
 use control_core::excitation::{Excitation, GENTLE_TORQUE, Servo, Signal};
 use control_core::units::{Damping, Millimetres, Milliradians, Stiffness};
@@ -139,6 +140,11 @@ impl CommissioningOutcome {
                 }
             ),
             format!("tilt with the needle flat {} mrad", device.skin_tilt.0),
+            format!(
+                "encoder's supply {}, motor's current {}",
+                if device.sensors.encoder_supply { "sensed: no start without it" } else { "not sensed" },
+                if device.sensors.current { "measured: no start without it" } else { "not measured" },
+            ),
         ]
     }
 
@@ -166,7 +172,12 @@ pub async fn commission(
     let before = bench.device().await?;
     // Whatever it was: until it has passed again it is not commissioned, and the forces that were
     // found are another device's.
-    let mut device = Device { commissioned: false, compensation: Compensation::NONE, ..before };
+    let mut device = Device {
+        commissioned: false,
+        compensation: Compensation::NONE,
+        sensors: Sensors::default(),
+        ..before
+    };
     let rests = |samples: &[_]| findings::has_moved_and_rests(samples, ticks(REST));
 
     ask(CommissioningStep::Turn(wish.turns)).await?;

@@ -8,7 +8,7 @@ use super::winding::Winding;
 use crate::error::Error;
 use crate::named_files::{self, Text};
 use crate::profile::fix;
-use control_core::config::{DacWidth, Mechanism, SafetyConfig, SpeedMethod};
+use control_core::config::{DacWidth, Mechanism, SafetyConfig, Sensors, SpeedMethod};
 use control_core::units::{Damping, Grams, Millimetres, MillinewtonMetres, Milliradians, Newtons, Stiffness};
 use control_core::{Device, Patient, Plan};
 use fixed::types::I8F24;
@@ -87,6 +87,8 @@ struct File {
     control: Control,
     #[serde(default)]
     mechanism: Moving,
+    #[serde(default)]
+    sensors: Fitted,
     compensation: Option<Compensated>,
     grip: Option<Grip>,
     motor: Option<Winding>,
@@ -126,6 +128,14 @@ struct Moving {
     mass_g: Option<f64>,
     dry_friction_n: Option<f64>,
     delay_us: Option<u16>,
+}
+
+/// The optional sensors that commissioning found.
+#[derive(Default, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+struct Fitted {
+    encoder_supply: bool,
+    current: bool,
 }
 
 #[derive(Default, Deserialize, Serialize)]
@@ -190,6 +200,8 @@ impl File {
             device.passivity_damping = damping("passivity_damping_n_s_per_mm", value)?;
         }
         self.mechanism.set(&mut device.mechanism)?;
+        let Fitted { encoder_supply, current } = self.sensors;
+        device.sensors = Sensors { encoder_supply, current };
         if let Some(compensation) = &self.compensation {
             device.compensation = compensation.compensation()?;
         }
@@ -242,6 +254,10 @@ impl File {
                 mass_g: Some(device.mechanism.mass.0.to_num()),
                 dry_friction_n: Some(device.mechanism.dry_friction.0.to_num()),
                 delay_us: Some(device.mechanism.delay_us),
+            },
+            sensors: Fitted {
+                encoder_supply: device.sensors.encoder_supply,
+                current: device.sensors.current,
             },
             // It is the ceiling of torque that a device keeps of it.
             grip: None,
@@ -317,6 +333,7 @@ mod tests {
             skin_tilt: Milliradians(-123),
             speed: SpeedMethod::EdgeTiming,
             counts_per_turn: 2_048,
+            sensors: Sensors { encoder_supply: true, current: false },
             ..Device::commissioned_virtual()
         };
         device.limits.winding_time_s = 30;
