@@ -46,16 +46,24 @@ pub struct Telemetry<B: Board> {
 
 impl<B: Board> Telemetry<B> {
     /// `plan` is the one that the tick starts with, `reset_cause` the fault that ended the last
-    /// run, and `crash` the record that it left where it gave up.
+    /// run, `crash` the record that it left where it gave up, and `knows_heat` true if the motor's
+    /// heat is known.
     pub fn new(
         shared: &'static Shared,
-        (identity, plan, reset_cause, crash): (Identity, &Plan, Option<Fault>, Option<Crash>),
+        (identity, plan, reset_cause, crash, knows_heat): (
+            Identity,
+            &Plan,
+            Option<Fault>,
+            Option<Crash>,
+            bool,
+        ),
         store: Store<B::Flash>,
         (ends, waiting): (TelemetryEnds, &'static mut Waiting),
         lamps: B::Lamps,
     ) -> Self {
         let mut endpoint = Endpoint::with(waiting, identity, plan, reset_cause);
         endpoint.set_crash(crash);
+        endpoint.set_knows_heat(knows_heat);
         Self {
             shared,
             endpoint,
