@@ -75,6 +75,9 @@ pub struct Device {
     pub commissioned: bool,
     /// The optional sensors that commissioning found: without one of them it does not start.
     pub sensors: Sensors,
+    /// The uncertainty of [`Self::full_scale_torque`] where a known weight was hung on the needle:
+    /// two standard deviations, in thousandths of it. 0 where nobody did.
+    pub torque_uncertainty: u16,
 }
 
 /// The optional sensors of the drive.
@@ -280,6 +283,7 @@ impl Default for Device {
             compensation: Compensation::NONE,
             commissioned: false,
             sensors: Sensors::default(),
+            torque_uncertainty: 0,
         }
     }
 }

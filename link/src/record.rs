@@ -4,8 +4,9 @@ use crate::codec::{self, MAX_FRAME};
 use control_core::Device;
 use serde::{Deserialize, Serialize};
 
-/// The bytes of [`Device::sensors`], which no record had before the firmware that finds them.
-const ADDED: [u8; 2] = [0; 2];
+/// The bytes of [`Device::sensors`] and [`Device::torque_uncertainty`] where nothing is known of
+/// them, which no record had up to protocol 9.
+const ADDED: [u8; 3] = [0; 3];
 
 /// The device's part of the configuration, under the seal of the device that reported it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -30,8 +31,8 @@ impl Record {
     }
 }
 
-/// The seal of a device that knows of no sensor is the one that it had before a record could say
-/// so: an older record is still the device's own.
+/// The seal of a device that knows nothing of the fields added since is the one that it had before:
+/// an older record is still the device's own.
 fn seal(device: &Device, serial: [u8; 12]) -> u32 {
     let mut plain = [0; MAX_FRAME];
     // A device always fits: a frame holds more than one.

@@ -101,6 +101,8 @@ struct Drive {
     counts_per_turn: Option<u16>,
     encoder_reversed: Option<bool>,
     full_scale_torque_mnm: Option<f64>,
+    /// Two standard deviations, as a weight on the needle has shown it.
+    full_scale_uncertainty_percent: Option<f64>,
     dac_bits: Option<u8>,
     dac_zero_codes: Option<i16>,
     motor_reversed: Option<bool>,
@@ -175,6 +177,12 @@ impl File {
         if let Some(torque) = drive.full_scale_torque_mnm {
             device.full_scale_torque = MillinewtonMetres(fix("full_scale_torque_mnm", torque)?);
         }
+        if let Some(percent) = drive.full_scale_uncertainty_percent {
+            if !(0.0..=100.0).contains(&percent) {
+                return Err(format!("full_scale_uncertainty_percent is {percent}; it must be from 0 to 100"));
+            }
+            device.torque_uncertainty = (percent * 10.0).round() as u16;
+        }
         if let Some(bits) = drive.dac_bits {
             device.dac =
                 DacWidth::try_from(bits).map_err(|_| format!("dac_bits is {bits}; it must be 8 to 16"))?;
@@ -226,6 +234,8 @@ impl File {
                 counts_per_turn: Some(device.counts_per_turn),
                 encoder_reversed: Some(device.encoder_reversed),
                 full_scale_torque_mnm: Some(device.full_scale_torque.0.to_num()),
+                full_scale_uncertainty_percent: (device.torque_uncertainty > 0)
+                    .then(|| f64::from(device.torque_uncertainty) / 10.0),
                 dac_bits: Some(device.dac.bits()),
                 dac_zero_codes: Some(device.dac_zero),
                 motor_reversed: Some(device.motor_reversed),
@@ -334,6 +344,7 @@ mod tests {
             speed: SpeedMethod::EdgeTiming,
             counts_per_turn: 2_048,
             sensors: Sensors { encoder_supply: true, current: false },
+            torque_uncertainty: 17,
             ..Device::commissioned_virtual()
         };
         device.limits.winding_time_s = 30;
