@@ -131,6 +131,7 @@ byId("connect").addEventListener("click", () => (port ? port.close() : connect()
 byId("commission").addEventListener("click", () => begin({
   do: "commission", turns: number("turns"), pull_mm: number("pull"), counts_per_turn: byId("per-turn").value ? number("per-turn") : null,
 }));
+byId("weigh").addEventListener("click", () => begin({ do: "weigh", grams: number("grams"), correct: byId("correct").checked }));
 byId("compensate").addEventListener("click", async () => {
   const [file] = byId("rig").files;
   if (!file) return say("Choose the patched-rig.toml that host-sim diagnose wrote.");

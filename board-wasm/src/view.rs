@@ -39,6 +39,8 @@ pub struct View {
     events: VecDeque<Line>,
     last_tick: u64,
     last_samples: Option<Duration>,
+    /// The tick at which the motor's heat is known again.
+    cools_at: Option<u64>,
     has_restarted: bool,
 }
 
@@ -84,7 +86,7 @@ struct Needle {
     angle_deg: f64,
     tilt_deg: f64,
     state: &'static str,
-    limits: Vec<&'static str>,
+    limits: Vec<String>,
 }
 
 #[derive(Debug, Serialize)]
@@ -126,6 +128,8 @@ impl View {
             DeviceFrame::Hello(hello) => {
                 self.fault = hello.fault.map(|fault| fault.to_string());
                 self.hello = Some(hello.clone());
+                // It follows the hello, if it is unknown.
+                self.cools_at = None;
             }
             DeviceFrame::Samples(block) => {
                 self.has_restarted |= block.first_tick + RESTART_TICKS < self.last_tick;
@@ -163,6 +167,10 @@ impl View {
             }
             EventKind::FarWall { layer } => format!("through the far wall of layer {}", u16::from(layer) + 1),
             EventKind::NotSaved { cause } => cause.to_string(),
+            EventKind::HeatUnknown { seconds } => {
+                self.cools_at = Some(event.tick + u64::from(seconds) * u64::from(control_core::TICK_HZ));
+                format!("the motor's heat is unknown: at most its continuous torque for {seconds} s")
+            }
             EventKind::Barrier => "turned further than the tissue allows".into(),
             // They come in the hundreds, and the needle's own line shows the limits.
             EventKind::Limits { .. } | EventKind::InTrack { .. } => return,
@@ -178,7 +186,7 @@ impl View {
             kind: "board",
             live: self.is_live(now),
             board: self.hello.as_ref().map(board),
-            needle: self.pose.as_ref().map(needle),
+            needle: self.pose.as_ref().map(|pose| needle(pose, self.cools_at)),
             reading: self.reading(),
             fault: self.fault.as_deref(),
             crash: self.crash.as_deref(),
@@ -204,7 +212,11 @@ fn board(hello: &Hello) -> Board {
     }
 }
 
-fn needle(pose: &Pose) -> Needle {
+fn needle(pose: &Pose, cools_at: Option<u64>) -> Needle {
+    let left = cools_at.and_then(|at| at.checked_sub(pose.tick)).filter(|ticks| *ticks > 0);
+    let cooling = left.map(|ticks| {
+        format!("motor's heat unknown for {} s", ticks.div_ceil(u64::from(control_core::TICK_HZ)))
+    });
     Needle {
         depth_mm: pose.depth.0.to_num(),
         speed_mm_s: pose.speed.0.to_num(),
@@ -215,7 +227,8 @@ fn needle(pose: &Pose) -> Needle {
         limits: LIMITS
             .iter()
             .filter(|(limit, _)| pose.limits.contains(*limit))
-            .map(|(_, name)| *name)
+            .map(|(_, name)| (*name).to_owned())
+            .chain(cooling)
             .collect(),
     }
 }

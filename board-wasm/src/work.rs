@@ -2,6 +2,7 @@
 //! guide's button.
 
 use device_setup::bench::{Act, Line};
+use device_setup::commission::weigh::{WeighWish, weigh};
 use device_setup::commission::{self, Wish};
 use device_setup::compensate;
 use device_setup::pause::pause;
@@ -36,6 +37,13 @@ pub enum Task {
         pull_mm: f64,
         /// Counts a turn where the encoder's are known.
         counts_per_turn: Option<u16>,
+    },
+    /// Check with a weight on the needle that 1 N is 1 N.
+    Weigh {
+        /// The weight in g.
+        grams: f64,
+        /// Correct the torque at full scale if it is wrong.
+        correct: bool,
     },
     /// Feed forward what a diagnosis found.
     Compensate {
@@ -76,6 +84,7 @@ impl Work {
     pub fn new(task: Task) -> Result<Self, Error> {
         let title = match task {
             Task::Commission { .. } => "Commissioning",
+            Task::Weigh { .. } => "Weighing",
             Task::Compensate { .. } => "Compensation",
         };
         let shared = Rc::new(RefCell::new(Shared {
@@ -156,6 +165,10 @@ fn dialogue(task: Task, shared: Rc<RefCell<Shared>>) -> Result<Dialogue, Error> 
             }
             Box::pin(commission(Wish { turns, pull_mm, counts_per_turn }, shared))
         }
+        Task::Weigh { grams, correct } => {
+            within("the weight in g", grams, 1.0, 10_000.0)?;
+            Box::pin(weighing(WeighWish { grams, correct }, shared))
+        }
         Task::Compensate { rig, share } => {
             within("the share of the gains", share, 0.0, 1.0)?;
             let rig = Rig::parse(&rig, "patched-rig.toml").map_err(Error::input)?;
@@ -176,6 +189,13 @@ async fn commission(wish: Wish, shared: Rc<RefCell<Shared>>) -> Result<Finding, 
     let mut line = BrowserLine::new(&shared);
     let asks = async |step: commission::CommissioningStep| ask(&shared, &step, step.moves()).await;
     let outcome = commission::commission(&mut line, &wish, asks).await?;
+    Ok(Finding { lines: outcome.lines(), file: outcome.to_toml("board")? })
+}
+
+async fn weighing(wish: WeighWish, shared: Rc<RefCell<Shared>>) -> Result<Finding, Error> {
+    let mut line = BrowserLine::new(&shared);
+    let asks = async |step: commission::CommissioningStep| ask(&shared, &step, step.moves()).await;
+    let outcome = weigh(&mut line, &wish, asks).await?;
     Ok(Finding { lines: outcome.lines(), file: outcome.to_toml("board")? })
 }
 

@@ -100,6 +100,7 @@ pub fn changed(before: &Device, after: &Device) -> Option<Field> {
         (Field::MovingMass, moves.mass <= moved.mass),
         (Field::MechanismFriction, moves.dry_friction <= moved.dry_friction),
         (Field::DriveDelayUs, moves.delay_us >= moved.delay_us),
+        (Field::Sensors, before.sensors.missing_in(after.sensors).is_none()),
     ];
     kept.into_iter().find_map(|(field, is_kept)| (!is_kept).then_some(field))
 }
@@ -107,6 +108,7 @@ pub fn changed(before: &Device, after: &Device) -> Option<Field> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::config::Sensors;
     use crate::units::Millimetres;
 
     const BOARD: Ceilings = Ceilings::new(40, 600);
@@ -169,7 +171,7 @@ mod tests {
     #[test]
     fn a_commissioned_device_may_be_lowered_but_not_raised() {
         type Change = (Field, fn(&mut Device));
-        let changes: [Change; 18] = [
+        let changes: [Change; 19] = [
             (Field::RollerRadius, |d| d.roller_radius.0 -= I16F16::ONE),
             (Field::CountsPerTurn, |d| d.counts_per_turn += 4),
             (Field::EncoderSign, |d| d.encoder_reversed = true),
@@ -188,8 +190,12 @@ mod tests {
             (Field::MovingMass, |d| d.mechanism.mass.0 += I16F16::DELTA),
             (Field::MechanismFriction, |d| d.mechanism.dry_friction.0 += I16F16::DELTA),
             (Field::DriveDelayUs, |d| d.mechanism.delay_us -= 1),
+            (Field::Sensors, |d| d.sensors.current = false),
         ];
-        let before = Device::commissioned_virtual();
+        let before = Device {
+            sensors: Sensors { encoder_supply: false, current: true },
+            ..Device::commissioned_virtual()
+        };
         for (field, change) in changes {
             let mut after = before;
             change(&mut after);
@@ -209,6 +215,7 @@ mod tests {
         gentler.mechanism.mass.0 /= 2;
         gentler.mechanism.dry_friction.0 /= 2;
         gentler.mechanism.delay_us *= 2;
+        gentler.sensors.encoder_supply = true;
         assert_eq!(changed(&before, &gentler), None);
         assert_eq!(changed(&gentler, &before), Some(Field::TorqueLimit), "not back again");
     }

@@ -2,6 +2,7 @@
 //! in flash; it says nothing about whether it is safe: only [`crate::plan::Plan::new`] does.
 
 use crate::compensation::Compensation;
+use crate::interlock::Interlock;
 use crate::units::{
     Damping, FrictionPerMillimetre, Grams, JogCompliance, Millimetres, MillinewtonMetres, Milliradians,
     Newtons, Stiffness,
@@ -72,6 +73,31 @@ pub struct Device {
     /// True if the values above were found on this device. Without it no torque is given but
     /// [`crate::excitation::GENTLE_TORQUE`].
     pub commissioned: bool,
+    /// The optional sensors that commissioning found: without one of them it does not start.
+    pub sensors: Sensors,
+    /// The uncertainty of [`Self::full_scale_torque`] where a known weight was hung on the needle:
+    /// two standard deviations, in thousandths of it. 0 where nobody did.
+    pub torque_uncertainty: u16,
+}
+
+/// The optional sensors of the drive.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Sensors {
+    /// The encoder's supply is sensed.
+    pub encoder_supply: bool,
+    /// The motor's current is measured.
+    pub current: bool,
+}
+
+impl Sensors {
+    /// The interlock of the first of these that is not among `fitted`.
+    pub fn missing_in(self, fitted: Self) -> Option<Interlock> {
+        if self.encoder_supply && !fitted.encoder_supply {
+            Some(Interlock::EncoderSupplyUnsensed)
+        } else {
+            (self.current && !fitted.current).then_some(Interlock::CurrentUnmeasured)
+        }
+    }
 }
 
 /// The mass and friction that move with the roller, and the delay of the motor.
@@ -256,6 +282,8 @@ impl Default for Device {
             mechanism: Mechanism::default(),
             compensation: Compensation::NONE,
             commissioned: false,
+            sensors: Sensors::default(),
+            torque_uncertainty: 0,
         }
     }
 }

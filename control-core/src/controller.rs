@@ -75,9 +75,9 @@ impl Mode {
 }
 
 impl Core {
-    /// Torque off, waiting to be started, with a motor that has this heat.
-    fn warm(plan: Plan, heat: u32) -> Self {
-        let mut winding = Winding::with_heat(heat);
+    /// Torque off, waiting to be started, with a motor that has this heat, if it is known.
+    fn warm(plan: Plan, heat: Option<u32>) -> Self {
+        let mut winding = heat.map_or_else(|| Winding::unknown(&plan.thermal), Winding::with_heat);
         winding.allow(&plan.thermal, plan.torque_limits.torque);
         let mut feedforward = Feedforward::default();
         feedforward.set_gains(plan.device().compensation.gains);

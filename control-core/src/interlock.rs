@@ -27,11 +27,17 @@ pub enum Interlock {
     NotCommissioned = 6,
     /// Nobody has said where depth 0 is since the last reset.
     NotZeroed = 7,
+    /// The tilt sensor is absent, stuck or answers nonsense, or has not measured yet.
+    TiltSensor = 8,
+    /// The encoder's supply was sensed at commissioning, and is not.
+    EncoderSupplyUnsensed = 9,
+    /// The motor's current was measured at commissioning, and is not.
+    CurrentUnmeasured = 10,
 }
 
 impl Interlock {
     /// All of them, each at the place of its number.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 11] = [
         Self::Supply,
         Self::EmergencyStop,
         Self::AmplifierNotReady,
@@ -40,6 +46,9 @@ impl Interlock {
         Self::Saving,
         Self::NotCommissioned,
         Self::NotZeroed,
+        Self::TiltSensor,
+        Self::EncoderSupplyUnsensed,
+        Self::CurrentUnmeasured,
     ];
 
     /// The fault that it is where torque is on.
@@ -50,9 +59,14 @@ impl Interlock {
             Self::AmplifierNotReady => Fault::AmplifierNotReady,
             Self::AmplifierStuckOn => Fault::AmplifierStuckOn,
             Self::EncoderWire => Fault::EncoderWire,
-            // Nobody begins to save while torque is on; the last two keep a device from being
-            // started and come at no other time.
-            Self::Saving | Self::NotCommissioned | Self::NotZeroed => Fault::Overrun,
+            Self::TiltSensor => Fault::Tilt,
+            // Nobody begins to save while torque is on; the others keep a device from being started
+            // and come at no other time.
+            Self::Saving
+            | Self::NotCommissioned
+            | Self::NotZeroed
+            | Self::EncoderSupplyUnsensed
+            | Self::CurrentUnmeasured => Fault::Overrun,
         }
     }
 }
@@ -74,6 +88,15 @@ impl fmt::Display for Interlock {
             Self::Saving => "the configuration is being saved; try again in two seconds",
             Self::NotCommissioned => "the device has not been commissioned; run host-sim commission first",
             Self::NotZeroed => "the depth is unknown since the device was switched on; hold the tip on the skin and press Zero depth here",
+            Self::TiltSensor => {
+                "the tilt sensor does not measure; check its wires, or replace the board if the sensor is on it"
+            }
+            Self::EncoderSupplyUnsensed => {
+                "the encoder's supply was sensed at commissioning and is not now; check its sense wire and the encoder's plug, or commission again without it"
+            }
+            Self::CurrentUnmeasured => {
+                "the motor's current was measured at commissioning and is not now; check the monitor's wires and switch the board off and on, or commission again without it"
+            }
         })
     }
 }

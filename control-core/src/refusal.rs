@@ -217,6 +217,7 @@ fields! {
     SlidingShare: "sliding",
     FrictionLimitOut: "limit_out_n",
     Vertex: "vertex_mm",
+    Sensors: "[sensors]",
 }
 
 impl fmt::Display for Refusal {

@@ -58,9 +58,16 @@ impl Winding {
         Self { heat: I32F32::from_bits(i64::from(heat) << 16), ..Self::default() }
     }
 
-    /// Heat in (mN·m)², in Q16.
+    /// One of unknown heat. It may be as hot as the continuous torque makes it, and hotter where
+    /// another program drove it: it counts as so hot that it reaches that heat after its time
+    /// constant at the earliest.
+    pub(crate) fn unknown(limits: &ThermalLimits) -> Self {
+        Self { heat: limits.allowed * I32F32::E, ..Self::default() }
+    }
+
+    /// Heat in (mN·m)², in Q16; hotter than that holds is as hot as it holds.
     pub(crate) fn heat(&self) -> u32 {
-        u32::try_from(self.heat.to_bits() >> 16).unwrap_or_default()
+        u32::try_from(self.heat.to_bits() >> 16).unwrap_or(u32::MAX)
     }
 
     /// One tick with `given` torque.

@@ -67,7 +67,7 @@ mod app {
             usb: Port::new(&SHARED, parts.serial, ends.usb),
             telemetry: context.local.telemetry_place.write(Telemetry::new(
                 &SHARED,
-                (parts.identity, &parts.plan, parts.reset_cause, parts.crash),
+                (parts.identity, &parts.plan, parts.reset_cause, parts.crash, parts.heat.is_some()),
                 parts.store,
                 ends.telemetry,
                 parts.lamps,

@@ -22,7 +22,8 @@ pub struct ResetFlags {
 }
 
 /// Words that no start-up code clears. After a power-up they hold anything: each says itself
-/// whether it means something.
+/// whether it means something. The heat is last: the emulated board finds it there.
+#[repr(C)]
 pub struct LastWords {
     /// The check of the others, then what [`words_of`] makes.
     crash: [AtomicU32; 1 + CRASH_WORDS],
@@ -37,8 +38,9 @@ pub struct Said {
     pub crash: Option<Crash>,
     /// True if torque was on.
     pub torque: bool,
-    /// The winding's heat as `Controller::heat` gave it; 0 where nobody knows.
-    pub heat: u32,
+    /// The winding's heat as `Controller::heat` gave it; `None` where nobody knows, as after a loss
+    /// of power.
+    pub heat: Option<u32>,
 }
 
 /// Words of a crash: six numbers, then the bytes of the file's name.
@@ -145,9 +147,9 @@ impl LastWords {
         inverse.store(!heat, Relaxed);
     }
 
-    fn heat_was(&self) -> u32 {
+    fn heat_was(&self) -> Option<u32> {
         let [word, inverse] = self.heat.each_ref().map(|word| word.load(Relaxed));
-        if inverse == !word { word } else { 0 }
+        (inverse == !word).then_some(word)
     }
 
     /// Returns the last words before the reset and forgets them, but for the heat.
@@ -183,7 +185,7 @@ pub fn cause(flags: ResetFlags, crash: Option<&Crash>, torque_was_on: bool) -> O
 mod tests {
     use super::*;
 
-    const NOTHING: Said = Said { crash: None, torque: false, heat: 0 };
+    const NOTHING: Said = Said { crash: None, torque: false, heat: None };
     const PANIC: Crash = Crash::new(CrashKind::Panic, 42);
 
     #[test]
@@ -194,8 +196,8 @@ mod tests {
         words.torque(true);
         words.heat(77);
         words.crash(&Crash::new(CrashKind::HardFault, 1));
-        assert_eq!(words.take(), Said { crash: Some(PANIC), torque: true, heat: 77 });
-        assert_eq!(words.take(), Said { heat: 77, ..NOTHING }, "a motor does not cool by being asked");
+        assert_eq!(words.take(), Said { crash: Some(PANIC), torque: true, heat: Some(77) });
+        assert_eq!(words.take(), Said { heat: Some(77), ..NOTHING }, "a motor does not cool by being asked");
         words.heat[1].fetch_xor(1, Relaxed);
         assert_eq!(words.take(), NOTHING);
     }

@@ -23,7 +23,8 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use writing::{Writing, checksum};
 
-/// Raised whenever the bytes of a stored record mean something else.
+/// Raised whenever the bytes of a stored record mean something else. A field added at the end does
+/// not raise it if zeros say that nothing is known of it: a shorter record is read so.
 pub(crate) const LAYOUT_VERSION: u8 = 6;
 /// Words of a cell: 1 KiB, room for the longest record.
 pub const CELL_WORDS: usize = 256;
@@ -282,7 +283,9 @@ impl<F: ConfigFlash> Store<F> {
             _ if is_damaged => Stored::Damaged,
             None => Stored::None,
             Some(newest) => {
-                let record = self.read(newest, &mut bytes).and_then(|bytes| postcard::from_bytes(bytes).ok());
+                let is_read = self.read(newest, &mut bytes).is_some();
+                // With the zeros that follow it: a field that it does not have yet.
+                let record = if is_read { postcard::from_bytes(&bytes).ok() } else { None };
                 record.map_or(Stored::Damaged, Stored::Found)
             }
         }

@@ -40,6 +40,8 @@ pub struct Wires {
     /// All lines are at one level. Where they are not, one is held high and another low, both
     /// against their pulls, and the encoder has power.
     pub agree: bool,
+    /// The encoder's supply is sensed: it has been there for long enough.
+    pub supply_sensed: bool,
 }
 
 /// Looks for wires that are off, every millisecond.
@@ -62,12 +64,17 @@ impl WireWatch {
         let (driven_high, floating) = pulled(lines);
         self.looks = if floating == 0 { 0 } else { (self.looks + 1).min(LOOKS) };
         let off = self.looks == LOOKS || self.has_lost_supply(lines.has_supply());
-        Wires { off, agree: driven_high == 0 || driven_high == L::ALL }
+        let agree = driven_high == 0 || driven_high == L::ALL;
+        Wires { off, agree, supply_sensed: self.is_sensed() }
+    }
+
+    fn is_sensed(&self) -> bool {
+        self.supplied == SUPPLY_LOOKS
     }
 
     /// True if a supply that has been there is gone. It may come back.
     fn has_lost_supply(&mut self, has_supply: bool) -> bool {
-        let is_sensed = self.supplied == SUPPLY_LOOKS;
+        let is_sensed = self.is_sensed();
         if has_supply {
             (self.supplied, self.unsupplied) = ((self.supplied + 1).min(SUPPLY_LOOKS), 0);
         } else if is_sensed {

@@ -1,6 +1,6 @@
 // What has happened, in words, newest first.
 
-import { capital, number, said, t, taskName, tissueName } from "./language.js";
+import { capital, count, number, said, t, taskName, tissueName } from "./language.js";
 
 const LONGEST_LIST = 80;
 
@@ -28,6 +28,7 @@ export function words(event, layers) {
     case "fault": return t("event.fault", { cause: said(event.cause) });
     case "not_saved": return capital(said(event.cause));
     case "cleared": return t("event.cleared");
+    case "heat_unknown": return t("event.heat_unknown", { seconds: count(event.ends_in_s) });
     case "started": return t("event.started");
     case "stopped": return t("event.stopped");
     default: return null; // limits have lamps

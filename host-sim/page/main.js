@@ -128,6 +128,7 @@ function happen(event) {
   body.happen(event);
   practice.happen(event);
   events.add(event, scene.layers);
+  if (event.kind === "heat_unknown") panel.cool(event.ends_in_s, performance.now());
   if (event.limits) panel.limits(event.limits, performance.now());
   if (event.kind === "puncture") {
     timePlot.mark(event.t_s, tissueName(scene.layers[event.layer]?.name ?? "layer"));

@@ -51,13 +51,17 @@ function stateWords(view, condition, played) {
 export class Panel {
   constructor() {
     this.sliders = document.querySelectorAll("input[type=range][data-unit]");
+    this.coolMs = -Infinity;
     this.lit = LIMITS.map(() => -Infinity);
     this.lamps = LIMITS.map(([, name]) => {
       const lamp = document.createElement("li");
       lamp.dataset.tone = "off";
       const dot = document.createElement("i");
       dot.setAttribute("aria-hidden", "true");
-      lamp.append(dot, t(name));
+      const words = document.createElement("span");
+      words.textContent = t(name);
+      lamp.append(dot, words);
+      if (name === "limit.warm") this.warm = words;
       byId("limits").append(lamp);
       return lamp;
     });
@@ -77,6 +81,11 @@ export class Panel {
     const name = /^0*$/.test(device.identity) ? t("source.virtual_name") : device.identity;
     write(byId("device"), `${name}, ${device.firmware}, ${device.tick_hz / 1000} kHz`);
     byId("device").title = t("source.device_title", { hash: device.config_hash, bits: device.dac_bits });
+  }
+
+  /** Counts down on the motor's lamp: its heat is unknown for so many seconds more. */
+  cool(seconds, nowMs) {
+    this.coolMs = nowMs + 1e3 * seconds;
   }
 
   /** Notes which limits are in force, at every frame, so that none is missed. */
@@ -107,6 +116,8 @@ export class Panel {
         lamp.setAttribute("aria-label", t(tone === "warn" ? "limit.on" : "limit.off", { name: t(LIMITS[i][1]) }));
       }
     });
+    const cooling = Math.ceil((this.coolMs - nowMs) / 1e3);
+    write(this.warm, condition === "live" && cooling > 0 ? t("limit.cooling", { seconds: count(cooling) }) : t("limit.warm"));
     const [state, tone] = stateWords(view, condition, this.played);
     chip("state", state, tone);
     // A screen reader announces what has changed, not each phase of an insertion.

@@ -32,6 +32,13 @@ pub fn encode<F: Serialize>(frame: &F, out: &mut [u8]) -> Result<usize, TooLong>
     Ok(coded + 1)
 }
 
+/// CRC-32 of these bytes, one part after the other.
+pub(crate) fn check(parts: [&[u8]; 2]) -> u32 {
+    let mut digest = CRC.digest();
+    parts.into_iter().for_each(|part| digest.update(part));
+    digest.finalize()
+}
+
 /// CRC-32 of anything that can be a frame: names a configuration.
 pub fn hash<F: Serialize>(value: &F) -> u32 {
     let mut plain = [0; MAX_FRAME];

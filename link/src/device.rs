@@ -15,7 +15,7 @@ use crate::frames::{
     PROTOCOL_VERSION, Pose, SampleBlock, SaveError, Timing,
 };
 use control_core::ceilings::Ceilings;
-use control_core::config::Tissue;
+use control_core::config::{Sensors, Tissue};
 use control_core::event::{Fault, Limits};
 use control_core::interlock::Interlocks;
 use control_core::{AnyOrder, Order, Plan, TICK_HZ, TickOutput};
@@ -85,9 +85,12 @@ pub struct Endpoint<W = Waiting> {
     zeroed: bool,
     proof: Proof,
     interlocks: Interlocks,
+    /// The optional sensors that are there, where somebody looks.
+    fitted: Option<Sensors>,
     limits: Limits,
     fault: Option<Fault>,
     crash: Option<Crash>,
+    knows_heat: bool,
     sequence: u32,
     hello_due: bool,
     crash_due: bool,
@@ -127,9 +130,11 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
             zeroed: false,
             proof: Proof::None,
             interlocks: Interlocks::default(),
+            fitted: None,
             limits: Limits::default(),
             fault: reset_cause,
             crash: None,
+            knows_heat: true,
             sequence: 0,
             hello_due: false,
             crash_due: false,

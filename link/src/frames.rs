@@ -170,6 +170,11 @@ pub enum EventKind {
     },
     /// A person has cleared the latched fault: the device may be started again.
     Cleared,
+    /// The motor's heat is unknown since the power came: after a hello, until it must have cooled.
+    HeatUnknown {
+        /// Torque is held to the continuous one for so many seconds from this event on.
+        seconds: u16,
+    },
 }
 
 /// The reason why a configuration was not saved.

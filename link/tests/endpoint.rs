@@ -12,7 +12,7 @@ use link::codec::{self, MAX_FRAME, TooLong};
 use link::commissioning::Record;
 use link::device::{Endpoint, Identity};
 use link::frames::{
-    Command, CommandRefusal, DeviceFrame, EventKind, Numbered, PROTOCOL_VERSION, SampleBlock, Timing,
+    Command, CommandRefusal, DeviceFrame, Event, EventKind, Numbered, PROTOCOL_VERSION, SampleBlock, Timing,
 };
 use link::host::{Commands, Reception};
 
@@ -105,6 +105,27 @@ fn another_version_is_turned_away() {
         "{frames:?}"
     );
     assert!(!device.endpoint.in_session());
+}
+
+#[test]
+fn a_hello_says_how_long_the_heat_is_unknown() {
+    let mut limited = config::Device::commissioned_virtual();
+    limited.limits.continuous_torque.0 /= 2;
+    let plan = Plan::new(&limited, &Patient::nobody()).expect("sound");
+    for (knows_heat, ticks, wanted) in
+        [(true, 0, None), (false, 0, Some(12)), (false, 45_000, Some(8)), (false, 120_001, None)]
+    {
+        let mut device = Device::new();
+        device.endpoint = Endpoint::new(Identity::VIRTUAL, &plan, None);
+        device.endpoint.set_knows_heat(knows_heat);
+        device.run(ticks);
+        device.say(Command::Hello { version: PROTOCOL_VERSION });
+        let told = device.heard().into_iter().find_map(|frame| match frame {
+            DeviceFrame::Event(Event { kind: EventKind::HeatUnknown { seconds }, .. }) => Some(seconds),
+            _ => None,
+        });
+        assert_eq!(told, wanted, "{knows_heat}, {ticks} ticks after power-up");
+    }
 }
 
 #[test]

@@ -28,6 +28,10 @@ pub struct State {
     pub hand_speed: f64,
     /// True if the motor's leads are reversed.
     pub reversed: bool,
+    /// The torque that the motor gives for each that it is asked for.
+    pub gain: f64,
+    /// The force that pulls it in, in N.
+    pub pull: f64,
 }
 
 /// The needle, shared between the test and the emulator's thread, and the instant to which it has
@@ -39,7 +43,15 @@ impl Needle {
     /// At rest, held at `depth` in m.
     #[must_use]
     pub fn held_at(depth: f64) -> Self {
-        let state = State { depth, speed: 0.0, hand: Some(depth), hand_speed: 0.0, reversed: false };
+        let state = State {
+            depth,
+            speed: 0.0,
+            hand: Some(depth),
+            hand_speed: 0.0,
+            reversed: false,
+            gain: 1.0,
+            pull: 0.0,
+        };
         Self(Arc::new(Mutex::new((state, 0))))
     }
 
@@ -81,10 +93,10 @@ impl State {
             Drive { code: Some(code), enabled: true } => (f64::from(code) - 2_048.0) / 2_047.0,
             _ => 0.0,
         };
-        let motor = FULL_SCALE * set * if self.reversed { -1.0 } else { 1.0 };
+        let motor = FULL_SCALE * self.gain * set * if self.reversed { -1.0 } else { 1.0 };
         let hand =
             self.hand.map_or(0.0, |at| GRIP.0 * (at - self.depth) + GRIP.1 * (self.hand_speed - self.speed));
-        let force = motor + hand - VISCOUS * self.speed;
+        let force = motor + self.pull + hand - VISCOUS * self.speed;
         if self.speed == 0.0 && force.abs() <= DRY {
             // It sticks.
         } else {

@@ -55,12 +55,15 @@ pub fn board(plant: impl PlantSide + 'static) -> Board {
     board_wired(Wiring::default(), plant)
 }
 
-/// The board of this wiring with its flash image on it.
+/// The board of this wiring with its flash image on it, and a motor that it takes for cold.
 ///
 /// # Panics
 ///
 /// When there is no image.
 #[must_use]
 pub fn board_wired(wiring: Wiring, plant: impl PlantSide + 'static) -> Board {
-    Board::on(&image_for(&wiring.pins), wiring, plant).unwrap_or_else(|why| panic!("{why}"))
+    let board = Board::on(&image_for(&wiring.pins), wiring, plant);
+    let mut board = board.unwrap_or_else(|why| panic!("{why}"));
+    board.cool_motor();
+    board
 }

@@ -23,13 +23,14 @@ impl Controller {
 
     /// The same, with a motor that has the heat which [`Self::heat`] gave before a reset.
     pub fn warm(plan: Plan, heat: u32) -> Self {
-        Self::with(Segments::new(), plan, heat)
+        Self::with(Segments::new(), plan, Some(heat))
     }
 }
 
 impl<S: BorrowMut<Segments>> Controller<S> {
-    /// [`Controller::warm`] with a place for what plays.
-    pub fn with(segments: S, plan: Plan, heat: u32) -> Self {
+    /// [`Controller::warm`] with a place for what plays. A motor whose heat is not known gives no
+    /// more than its continuous torque until its winding's time constant has passed.
+    pub fn with(segments: S, plan: Plan, heat: Option<u32>) -> Self {
         Self { core: Core::warm(plan, heat), segments }
     }
 

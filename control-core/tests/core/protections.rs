@@ -3,6 +3,7 @@
 
 use control_core::config::{Config, FrictionLaw, Law, Layer, Parabola, SPRING_BACK, Tissue, Wall};
 use control_core::event::Limits;
+use control_core::excitation::Segments;
 use control_core::units::{
     Counts, Damping, FrictionPerMillimetre, JogCompliance, Millimetres, MillinewtonMetres, Milliradians,
     Newtons, Stiffness,
@@ -154,8 +155,8 @@ fn a_stiff_wall_rings_without_the_observer_and_is_quiet_with_it() {
     }
 }
 
-/// Holds a strong wall for `seconds`; every tick's torque in mN·m and limits go to `see`.
-fn hold_strong(continuous_mnm: f64, seconds: usize, mut see: impl FnMut(f64, &TickOutput)) {
+/// A strong wall, and the count 0.7 mm into its 6 N/mm: about 5 N, 50 mN·m.
+fn strong(continuous_mnm: f64) -> (Config, i32) {
     let mut config = stiff_wall();
     config.device.full_scale_torque = MillinewtonMetres(q(60.0));
     config.device.limits.torque = MillinewtonMetres(q(60.0));
@@ -164,9 +165,14 @@ fn hold_strong(continuous_mnm: f64, seconds: usize, mut see: impl FnMut(f64, &Ti
     if let Some(wall) = &mut config.patient.layers[0].wall {
         wall.puncture_travel = Millimetres(q(0.75));
     }
-    let plan = config.plan().expect("sound");
-    // 0.7 mm into 6 N/mm: about 5 N, 50 mN·m.
-    let count = Counts((0.7 / plan.mm_per_count().to_num::<f64>()) as i32);
+    let count = (0.7 / config.plan().expect("sound").mm_per_count().to_num::<f64>()) as i32;
+    (config, count)
+}
+
+/// Holds a strong wall for `seconds`; every tick's torque in mN·m and limits go to `see`.
+fn hold_strong(continuous_mnm: f64, seconds: usize, mut see: impl FnMut(f64, &TickOutput)) {
+    let (config, count) = strong(continuous_mnm);
+    let (plan, count) = (config.plan().expect("sound"), Counts(count));
     let zero = f64::from(plan.zero_torque_code().0);
     let mut c = Controller::new(plan);
     c.tick(TickInput { count, tilt: STRAIGHT });
@@ -177,6 +183,30 @@ fn hold_strong(continuous_mnm: f64, seconds: usize, mut see: impl FnMut(f64, &Ti
         let count = Counts(count.0 + [0, 1, 2, 1][tick / 250 % 4]);
         let output = c.tick(TickInput { count, tilt: STRAIGHT });
         see((zero - f64::from(output.dac.0)) * 60.0 / 2047.0, &output);
+    }
+}
+
+/// Nobody knows how warm a motor is whose device has just been given power. The torque after a rest
+/// of that long, of a wall that asks for some 45 mN·m.
+#[test]
+fn an_unknown_heat_allows_the_continuous_torque_until_cooled() {
+    for (rest_s, is_held) in [(0.0, true), (1.4, true), (2.6, false)] {
+        let (config, count) = strong(28.8);
+        let plan = config.plan().expect("sound");
+        let zero = f64::from(plan.zero_torque_code().0);
+        let mut c = Controller::with(Segments::new(), plan, None);
+        let mut most = 0.0_f64;
+        for tick in 0..((rest_s + 0.5) * 1e4) as i32 {
+            c.order(Order::Heartbeat);
+            if tick == (rest_s * 1e4) as i32 {
+                c.order(Order::Start);
+            }
+            let count = Counts(count + [0, 1, 2, 1][tick as usize / 250 % 4]);
+            let output = c.tick(TickInput { count, tilt: STRAIGHT });
+            most = most.max((zero - f64::from(output.dac.0)) * 60.0 / 2047.0);
+        }
+        let as_held = (28.7..28.9).contains(&most);
+        assert!(as_held == is_held && most > 28.7, "{most} mN·m after {rest_s} s of 2 s");
     }
 }
 

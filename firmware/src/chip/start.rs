@@ -110,7 +110,7 @@ pub(crate) struct Parts<W: Wiring> {
     pub(crate) supply_level: SupplyLevel,
     pub(crate) store: Store<Nor<Sectors>>,
     pub(crate) plan: Plan,
-    pub(crate) heat: u32,
+    pub(crate) heat: Option<u32>,
     pub(crate) identity: Identity,
     pub(crate) reset_cause: Option<Fault>,
     pub(crate) crash: Option<Crash>,

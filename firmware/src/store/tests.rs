@@ -2,6 +2,7 @@
 //! is flipped.
 
 use super::*;
+use control_core::config::Sensors;
 use control_core::units::Millimetres;
 use std::vec;
 use std::vec::Vec;
@@ -392,17 +393,53 @@ fn a_flipped_bit_costs_the_record_that_it_is_in_and_no_other() {
     }
 }
 
+/// Flash whose first cell has this header, but for its length, and this payload.
+fn left_by_another(header: u32, payload: &[u8]) -> Flash {
+    let header = header | payload.len() as u32;
+    let mut flash = Flash::new();
+    flash.words[0][..3].copy_from_slice(&[header, 4, checksum(header, 4, payload)]);
+    for (word, bytes) in flash.words[0][HEADER_WORDS..].iter_mut().zip(payload.chunks(4)) {
+        let mut padded = [0xFF; 4];
+        padded[..bytes.len()].copy_from_slice(bytes);
+        *word = u32::from_le_bytes(padded);
+    }
+    flash.words[0][CELL_WORDS - 1] = COMMITTED;
+    flash
+}
+
+/// The default device, commissioned, as firmware of protocol 9 saved it, which knew of no sensors.
+#[test]
+fn a_device_saved_before_sensors_were_known_is_read_and_moved() {
+    let mut payload = [0; 105];
+    let known = [
+        (0, &[0x80, 0x80, 0x50, 0xA0, 0x1F, 0, 0x9A, 0xB3, 0xE6, 1, 1][..]),
+        (14, &[0x9A, 0xB3, 0xE6, 1, 0x9A, 0xB3, 0xE6, 1, 12, 0x80, 0x80, 8, 0xAC, 2, 16]),
+        (29, &[0x80, 0x80, 0xE0, 3, 0x80, 0x80, 16, 0xC8, 1, 0, 0, 0xDC, 0x9E, 10]),
+        (43, &[0x80, 0x80, 0xF0, 1, 0xB8, 0x3D, 100, 1]),
+        (91, &[0x80, 0x80, 16, 0x80, 0x80, 48]),
+        (104, &[1]),
+    ];
+    for (at, bytes) in known {
+        payload[at..at + bytes.len()].copy_from_slice(bytes);
+    }
+    let mut flash = left_by_another(0xC0F1_6400, &payload);
+    let found = Stored::Found(Device::commissioned_virtual());
+    assert_eq!(load(&mut flash), found);
+    // It moves to the other slot as it is.
+    for top in 1..2 * CELLS as i16 {
+        assert_eq!(Store::open(&mut flash).0.save_patient(&patient(top)), Ok(()));
+        assert_eq!(load(&mut flash), found);
+    }
+    let sensors = Sensors { encoder_supply: true, current: false };
+    let known = Device { sensors, ..Device::commissioned_virtual() };
+    assert_eq!(Store::open(&mut flash).0.save_device(&known), Ok(()));
+    assert_eq!(load(&mut flash), Stored::Found(known));
+}
+
 /// A firmware of the time when both parts were one record left this.
 #[test]
 fn a_cell_of_an_earlier_layout_is_not_read_and_not_damage() {
-    let payload = [7_u8; 200];
-    let header = MAGIC | 1 << 12 | payload.len() as u32;
-    let mut flash = Flash::new();
-    flash.words[0][..3].copy_from_slice(&[header, 4, checksum(header, 4, &payload)]);
-    for (word, bytes) in flash.words[0][HEADER_WORDS..].iter_mut().zip(payload.chunks(4)) {
-        *word = u32::from_le_bytes(bytes.try_into().unwrap());
-    }
-    flash.words[0][CELL_WORDS - 1] = COMMITTED;
+    let mut flash = left_by_another(MAGIC | 1 << 12, &[7; 200]);
     assert_eq!(load_both(&mut flash), (Stored::None, Stored::None));
     let (mut store, ..) = Store::open(&mut flash);
     store.save_device(&device(20), || true).unwrap();

@@ -3,7 +3,7 @@
 use crate::reset::LastWords;
 use crate::stage_timing::Stages;
 use crate::supervision::{Conditions, Reports, Trips};
-use control_core::config::DacWidth;
+use control_core::config::{DacWidth, Sensors};
 use control_core::units::{DacCode, Milliradians};
 use core::sync::atomic::{AtomicBool, AtomicI32, AtomicU8, AtomicU16, AtomicU32, Ordering::Relaxed};
 
@@ -47,7 +47,12 @@ pub struct Shared {
     pub last_words: &'static LastWords,
     given: AtomicU16,
     tilt_mrad: AtomicI32,
+    /// The optional sensors that are there: `ENCODER_SUPPLY`, `CURRENT`.
+    fitted: AtomicU8,
 }
+
+const ENCODER_SUPPLY: u8 = 1;
+const CURRENT: u8 = 2;
 
 impl Shared {
     /// As at start-up.
@@ -69,6 +74,7 @@ impl Shared {
             last_words,
             given: AtomicU16::new(DacWidth::BITS_16.mid_scale()),
             tilt_mrad: AtomicI32::new(0),
+            fitted: AtomicU8::new(0),
         }
     }
 
@@ -97,6 +103,19 @@ impl Shared {
     /// Gives the tick a new inclination.
     pub fn set_tilt(&self, tilt: Milliradians) {
         self.tilt_mrad.store(tilt.0.into(), Relaxed);
+    }
+
+    /// Sets the optional sensors that are there.
+    pub(crate) fn set_fitted(&self, sensors: Sensors) {
+        let bit = |is_there, bit| if is_there { bit } else { 0 };
+        let fitted = bit(sensors.encoder_supply, ENCODER_SUPPLY) | bit(sensors.current, CURRENT);
+        self.fitted.store(fitted, Relaxed);
+    }
+
+    /// Those that are there.
+    pub(crate) fn fitted(&self) -> Sensors {
+        let fitted = self.fitted.load(Relaxed);
+        Sensors { encoder_supply: fitted & ENCODER_SUPPLY != 0, current: fitted & CURRENT != 0 }
     }
 
     /// The latest inclination.

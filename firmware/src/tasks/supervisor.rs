@@ -9,6 +9,7 @@ use crate::reset::{Crash, CrashKind};
 use crate::supervision::Supervisor;
 use crate::timing::{SUPERVISOR_HZ, TILT_PERIOD_MS};
 use crate::wire_check::WireWatch;
+use control_core::config::Sensors;
 use control_core::event::Fault;
 use control_core::interlock::Interlock;
 use core::sync::atomic::Ordering::Relaxed;
@@ -50,7 +51,10 @@ impl<B: Board> Watch<B> {
         self.shared.lines_agree.store(wires.agree, Relaxed);
         let (lines, monitor) = &mut self.drive;
         let powered = self.shared.is_powered();
-        let verdict = monitor.look(&lines.read(), Asked { powered, code: self.shared.given() });
+        let readings = lines.read();
+        self.shared
+            .set_fitted(Sensors { encoder_supply: wires.supply_sensed, current: readings.current.is_some() });
+        let verdict = monitor.look(&readings, Asked { powered, code: self.shared.given() });
         for (interlock, is_on) in verdict.conditions() {
             self.shared.conditions.set(interlock, is_on);
         }

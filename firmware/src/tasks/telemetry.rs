@@ -54,16 +54,24 @@ pub struct Telemetry<B: Board> {
 
 impl<B: Board> Telemetry<B> {
     /// `plan` is the one that the tick starts with, `reset_cause` the fault that ended the last
-    /// run, and `crash` the record that it left where it gave up.
+    /// run, `crash` the record that it left where it gave up, and `knows_heat` true if the motor's
+    /// heat is known.
     pub fn new(
         shared: &'static Shared,
-        (identity, plan, reset_cause, crash): (Identity, &Plan, Option<Fault>, Option<Crash>),
+        (identity, plan, reset_cause, crash, knows_heat): (
+            Identity,
+            &Plan,
+            Option<Fault>,
+            Option<Crash>,
+            bool,
+        ),
         store: Store<B::Flash>,
         (ends, waiting): (TelemetryEnds, &'static mut Waiting),
         lamps: B::Lamps,
     ) -> Self {
         let mut endpoint = Endpoint::with(waiting, identity, plan, reset_cause);
         endpoint.set_crash(crash);
+        endpoint.set_knows_heat(knows_heat);
         Self {
             shared,
             endpoint,
@@ -127,6 +135,7 @@ impl<B: Board> Telemetry<B> {
         // A start that follows a configuration waits behind it.
         let saving = Interlocks::of(Interlock::Saving);
         self.endpoint.set_interlocks(Interlocks(self.shared.conditions.get().0 & !saving.0));
+        self.endpoint.set_fitted(self.shared.fitted());
         while let Some(packet) = self.ends.from_pc.dequeue() {
             self.endpoint.receive(&packet);
             if self.endpoint.take_stop() {

@@ -41,12 +41,12 @@ pub struct Tick<B: Board> {
 pub type BoardDrive<B> = Drive<<B as Board>::Converters, <B as Board>::Enable>;
 
 impl<B: Board> Tick<B> {
-    /// Torque off, under `plan`, with a motor as warm as `heat`.
+    /// Torque off, under `plan`, with a motor as warm as `heat`, if it is known.
     pub fn new(
         shared: &'static Shared,
         (timer, encoder, drive): (B::Timer, B::Encoder, BoardDrive<B>),
         plan: &Plan,
-        heat: u32,
+        heat: Option<u32>,
         (ends, segments): (TickEnds, &'static mut Segments),
     ) -> Self {
         Self {

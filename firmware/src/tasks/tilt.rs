@@ -1,11 +1,12 @@
-//! The tilt task: the sensor's inclination to the tick; a sensor that is broken, as a fault.
+//! The tilt task: the sensor's inclination to the tick; a sensor that does not measure, as an
+//! interlock, which ends a run too ([`super::supervisor`]).
 
 use super::shared::Shared;
 use crate::log;
 use crate::port::Board;
 use crate::supervision::Task;
 use crate::tilt::{Reading, TiltError, TiltSource, TiltWatch};
-use control_core::event::Fault;
+use control_core::interlock::Interlock;
 use link::frames::Stage;
 
 /// The tilt task's own state.
@@ -17,8 +18,9 @@ pub struct Tilt<B: Board> {
 }
 
 impl<B: Board> Tilt<B> {
-    /// Reads `source`.
+    /// Reads `source`; until it has measured, the device does not start.
     pub fn new(shared: &'static Shared, source: B::Tilt) -> Self {
+        shared.conditions.set(Interlock::TiltSensor, true);
         Self { shared, source, watch: TiltWatch::default(), error: None }
     }
 
@@ -28,10 +30,11 @@ impl<B: Board> Tilt<B> {
         let reading = self.source.read();
         if let Reading::New(tilt) = reading {
             self.shared.set_tilt(tilt);
+            self.shared.conditions.set(Interlock::TiltSensor, false);
         }
         let error = self.watch.judge(reading).err();
-        if error.is_some() && self.shared.is_powered() {
-            self.shared.trips.raise(Fault::Tilt);
+        if error.is_some() {
+            self.shared.conditions.set(Interlock::TiltSensor, true);
         }
         if error != self.error {
             match error {

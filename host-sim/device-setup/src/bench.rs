@@ -27,6 +27,8 @@ pub enum Act {
     Pull(f64),
     /// Tilts the needle to so many rad below the horizontal.
     Tilt(f64),
+    /// Hangs so many g on the needle and lets them go gently within three seconds; 0 takes them off.
+    Hang(f64),
 }
 
 /// A way to a device.
@@ -132,7 +134,9 @@ impl<'a> Bench<'a> {
     /// at what its own pulses have shown. Its record.
     pub async fn commission(&mut self, device: &Device) -> Result<Record, Error> {
         self.driver.commission();
-        self.becomes(&Device { commissioned: true, ..*device }).await
+        // The device knows itself which sensors it has.
+        let sensors = self.device().await?.sensors;
+        self.becomes(&Device { commissioned: true, sensors, ..*device }).await
     }
 
     /// Checks that what was asked for makes the device `wanted`, and that it stays so.
@@ -171,6 +175,11 @@ impl<'a> Bench<'a> {
         }
         self.line.act(Act::HandsOff);
         Ok(&self.samples)
+    }
+
+    /// Prompts the hand for what goes on while an excitation plays.
+    pub(crate) fn act(&mut self, act: Act) {
+        self.line.act(act);
     }
 
     /// Plays an excitation to its end or to a fault: the samples during which torque was on.

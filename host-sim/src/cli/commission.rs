@@ -9,7 +9,7 @@ use lab::characterise::mechanism::Wiring;
 use lab::characterise::{self, writer};
 use lab::commission::bench::{GuidedLine, Line, WireLine};
 use lab::commission::mechanism::VirtualLine;
-use lab::commission::{self, CommissioningOutcome, CommissioningStep, Wish};
+use lab::commission::{self, CommissioningStep, WeighWish, Wish};
 use live::serial::SerialPort;
 use live::serving::stop_on_signals;
 use live::{examples, say};
@@ -25,7 +25,8 @@ use std::sync::atomic::AtomicBool;
 #[command(after_help = examples!("Examples:
   host-sim commission
   host-sim commission --device /dev/ttyACM0 --page
-  host-sim commission --device /dev/ttyACM0 --pull-mm 200 --out device.toml"))]
+  host-sim commission --device /dev/ttyACM0 --pull-mm 200 --out device.toml
+  host-sim commission --device /dev/ttyACM0 --weigh 100g --correct --out device.toml"))]
 pub(crate) struct Commission {
     /// `virtual`, or the serial port of a device, such as /dev/ttyACM0
     #[arg(long, default_value = "virtual", value_name = "virtual|PATH")]
@@ -41,6 +42,13 @@ pub(crate) struct Commission {
     counts_per_turn: Option<u16>,
     #[command(flatten)]
     consent: ConsentFlags,
+    /// Hang this weight, such as 100g, on the needle of a commissioned device and check that 1 N is
+    /// 1 N
+    #[arg(long, value_name = "WEIGHT", value_parser = grams, conflicts_with_all = ["pull_mm", "turns", "counts_per_turn"])]
+    weigh: Option<f64>,
+    /// With --weigh: correct the torque at full scale if it is wrong, and prove the device again
+    #[arg(long, requires = "weigh")]
+    correct: bool,
     /// Also write the device's part to this file
     #[arg(long, value_name = "FILE.toml")]
     out: Option<PathBuf>,
@@ -52,18 +60,18 @@ impl Commission {
         let stop = Arc::new(AtomicBool::new(false));
         stop_on_signals(&stop)?;
         let consent = self.consent.open("Commissioning", &self.device, &stop)?;
-        let outcome = if self.device == "virtual" {
+        let found = if self.device == "virtual" {
             self.on_virtual(&wish, &consent)
         } else {
             self.on_port(&wish, &consent, &stop)
         };
-        consent.end(outcome.as_ref().map(CommissioningOutcome::lines));
-        let outcome = outcome?;
-        for line in outcome.lines() {
+        consent.end(found.as_ref().map(|found| found.lines.clone()));
+        let found = found?;
+        for line in &found.lines {
             say!("{line}");
         }
         if let Some(path) = &self.out {
-            std::fs::write(path, outcome.to_toml(&self.device)?).map_err(|cause| {
+            std::fs::write(path, &found.file).map_err(|cause| {
                 Error::input(format_args!(
                     "{}: the file cannot be written ({cause}); the device is commissioned; choose another --out",
                     path.display()
@@ -71,7 +79,7 @@ impl Commission {
             })?;
             say!("{}", path.display());
         }
-        say!("commissioned");
+        say!("{}", if self.weigh.is_some() { "weighed" } else { "commissioned" });
         Ok(())
     }
 
@@ -91,26 +99,55 @@ impl Commission {
         Ok(Wish { turns: self.turns, pull_mm: self.pull_mm, counts_per_turn: self.counts_per_turn })
     }
 
-    fn on_virtual(&self, wish: &Wish, consent: &Consent) -> Result<CommissioningOutcome, Error> {
+    fn on_virtual(&self, wish: &Wish, consent: &Consent) -> Result<Found, Error> {
         let scale = characterise::scale(&characterise::configuration())?;
-        let rig = writer::nominal_rig(&scale);
-        let line = VirtualLine::new(&rig, "the nominal rig", Wiring::default(), scale.roller_radius_mm)?;
-        on(line, wish, consent)
+        let (rig, radius_mm) = (writer::nominal_rig(&scale), scale.roller_radius_mm);
+        let name = "the nominal rig";
+        let line = if self.weigh.is_some() {
+            VirtualLine::commissioned(&rig, name, radius_mm)
+        } else {
+            VirtualLine::new(&rig, name, Wiring::default(), radius_mm)
+        };
+        self.on(line?, wish, consent)
     }
 
-    fn on_port(
-        &self,
-        wish: &Wish,
-        consent: &Consent,
-        stop: &AtomicBool,
-    ) -> Result<CommissioningOutcome, Error> {
+    fn on_port(&self, wish: &Wish, consent: &Consent, stop: &AtomicBool) -> Result<Found, Error> {
         let mut port = SerialPort::find(&self.device)?;
-        consent.needle_is_out()?;
-        on(WireLine::new(port.open().map_err(Error::failed)?, stop), wish, consent)
+        if self.weigh.is_none() {
+            consent.needle_is_out()?;
+        }
+        self.on(WireLine::new(port.open().map_err(Error::failed)?, stop), wish, consent)
+    }
+
+    fn on(&self, line: impl Line, wish: &Wish, consent: &Consent) -> Result<Found, Error> {
+        let mut line = GuidedLine { line, guide: consent.guide() };
+        let ask = |step: CommissioningStep| consent.ask(&step, step.moves());
+        Ok(match self.weigh {
+            Some(grams) => {
+                let wish = WeighWish { grams, correct: self.correct };
+                let outcome = commission::weigh(&mut line, &wish, ask)?;
+                Found { lines: outcome.lines(), file: outcome.to_toml(&self.device)? }
+            }
+            None => {
+                let outcome = commission::commission(&mut line, wish, ask)?;
+                Found { lines: outcome.lines(), file: outcome.to_toml(&self.device)? }
+            }
+        })
     }
 }
 
-fn on(line: impl Line, wish: &Wish, consent: &Consent) -> Result<CommissioningOutcome, Error> {
-    let mut line = GuidedLine { line, guide: consent.guide() };
-    commission::commission(&mut line, wish, |step: CommissioningStep| consent.ask(&step, step.moves()))
+/// The findings as lines, and the device's part as a file.
+struct Found {
+    lines: Vec<String>,
+    file: String,
+}
+
+/// Reads a weight with its unit, in g.
+fn grams(text: &str) -> Result<f64, String> {
+    let (number, unit) = match text.strip_suffix("kg") {
+        Some(number) => (number, 1e3),
+        None => (text.strip_suffix('g').unwrap_or_default(), 1.0),
+    };
+    let read = number.trim().parse::<f64>().ok().filter(|grams| grams.is_finite() && *grams > 0.0);
+    read.map(|number| number * unit).ok_or_else(|| "give it with its unit, such as 100g or 0.1kg".into())
 }

@@ -6,7 +6,7 @@ use diagnosis::rig::Rig;
 use lab::characterise::mechanism::{Channel, Wiring};
 use lab::characterise::{self, writer};
 use lab::commission::mechanism::VirtualLine;
-use lab::commission::{self, CommissioningOutcome, CommissioningStep, Wish};
+use lab::commission::{self, CommissioningOutcome, CommissioningStep, WeighOutcome, WeighWish, Wish};
 
 const RADIUS_MM: f64 = 12.5;
 const WISH: Wish = Wish { turns: 5, pull_mm: 100.0, counts_per_turn: None };
@@ -150,4 +150,61 @@ fn a_written_record_is_read_back() {
     let source = device_sim::named_files::Text { origin: "device.toml".into(), text };
     let part = device_sim::device::device_config::DeviceConfig::parse(source).expect("it is sound");
     assert_eq!(part.device, found.record.device);
+}
+
+/// Weighs 100 g on a motor that gives `gain` times what it is asked for.
+fn weighed(gain: f64, wiring: Wiring, correct: bool) -> (Result<WeighOutcome, Error>, Device) {
+    let mut rig = rig();
+    rig.actuator.gain *= gain;
+    // The 30 g and 0.06 N of the record: what commissioning finds with the wrong torque.
+    (rig.model.inertia, rig.model.coulomb) = (3e-6 * gain, Some(6e-4 * gain));
+    let line = VirtualLine::commissioned(&rig, "the test's rig", 10.0).expect("rotary, in DAC steps");
+    let mut line = line.wired(wiring);
+    let outcome = commission::weigh(&mut line, &WeighWish { grams: 100.0, correct }, |_| Ok(()));
+    (outcome, *line.device().plan().device())
+}
+
+#[test]
+fn a_weight_shows_what_a_newton_is() {
+    let right = Device::commissioned_virtual();
+    for gain in [0.5, 0.8, 1.0, 1.25, 2.0] {
+        let (outcome, in_force) = weighed(gain, Wiring::default(), true);
+        let outcome = outcome.unwrap_or_else(|why| panic!("{gain}: {why}"));
+        let within = f64::from(in_force.torque_uncertainty) * 1e-3;
+        println!("{gain}: {}", outcome.lines().join("; "));
+        assert_eq!(outcome.record.device, in_force);
+        assert!(in_force.commissioned && (1e-3..0.1).contains(&within), "{gain}: {within}");
+        assert!((outcome.factor / gain - 1.0).abs() <= within, "{gain}: {} of it", outcome.factor);
+        let wanted = if gain == 1.0 { 28.8 } else { 28.8 * gain };
+        let found = in_force.full_scale_torque.0.to_num::<f64>();
+        assert!((found / wanted - 1.0).abs() <= within, "{gain}: {found} mN·m");
+        assert_eq!(outcome.is_corrected, gain != 1.0);
+        assert!(in_force.limits.torque <= right.limits.torque, "{gain}: no ceiling rises");
+    }
+    let (outcome, in_force) = weighed(0.5, Wiring::default(), false);
+    let why = outcome.expect_err("nobody asked for a correction").to_string();
+    assert!(why.contains("0.5") && why.contains("--correct"), "{why}");
+    assert_eq!(in_force, right);
+}
+
+#[test]
+fn a_weight_that_shows_another_mistake_is_refused() {
+    let other_way = Wiring { leads_reversed: true, channels_swapped: true, ..Wiring::default() };
+    let leads = Wiring { leads_reversed: true, ..Wiring::default() };
+    for (gain, wiring, hint) in [
+        (1.0, other_way, "outwards"),
+        (1.0, leads, "ran away"),
+        (5.0, Wiring::default(), "hangs free"),
+        (0.2, Wiring::default(), "hold the needle"),
+    ] {
+        let (outcome, in_force) = weighed(gain, wiring, true);
+        let why = outcome.map(|outcome| outcome.lines()).expect_err(hint).to_string();
+        assert!(why.contains(hint) && why.contains(';') | why.contains(':'), "{why}");
+        assert_eq!(in_force, Device::commissioned_virtual(), "{hint}: nothing was changed");
+    }
+    let line = VirtualLine::commissioned(&rig(), "the test's rig", 10.0);
+    let mut line = line.expect("rotary, in DAC steps");
+    let heavy = commission::weigh(&mut line, &WeighWish { grams: 2_000.0, correct: true }, |_| Ok(()));
+    let why = heavy.map(|outcome| outcome.lines()).expect_err("the motor does not carry it").to_string();
+    assert!(why.contains("it must be from") && why.contains("2000 g"), "{why}");
 }

@@ -4,11 +4,11 @@ use super::{Endpoint, Waiting};
 use crate::commissioning::{Proof, may_become};
 use crate::frames::{Ack, Command, CommandRefusal, EventKind, HostFrame, PROTOCOL_VERSION};
 use control_core::compensation::check::check;
-use control_core::config::Device;
+use control_core::config::{Device, Sensors};
 use control_core::excitation::Excitation;
 use control_core::interlock::Interlock;
 use control_core::units::Counts;
-use control_core::{LargeOrder, Order, Patient, Plan};
+use control_core::{LargeOrder, Order, Patient, Plan, TICK_HZ};
 use core::borrow::BorrowMut;
 
 /// True if the command is only for a device whose torque is off.
@@ -41,6 +41,18 @@ fn gives_torque(command: &Command) -> bool {
 }
 
 impl<W: BorrowMut<Waiting>> Endpoint<W> {
+    /// Sets the optional sensors that are there. A device whose record names one that is not does
+    /// not start; where nobody looks, as on a virtual device, it does.
+    pub fn set_fitted(&mut self, fitted: Sensors) {
+        self.fitted = Some(fitted);
+    }
+
+    /// Says if the motor's heat is known. Where it is not, each hello is followed by the time for
+    /// which torque is held to the continuous one.
+    pub fn set_knows_heat(&mut self, is_known: bool) {
+        self.knows_heat = is_known;
+    }
+
     pub(super) fn command(&mut self, frame: HostFrame) {
         if matches!(frame.command, Command::Hello { .. }) {
             // A PC that starts anew may use old ids again.
@@ -105,7 +117,9 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
                 self.configure_device(&record.device)
             }
             Command::Commission => {
-                let device = Device { commissioned: true, ..*self.plan.device() };
+                let device = self.plan.device();
+                let sensors = self.fitted.unwrap_or(device.sensors);
+                let device = Device { commissioned: true, sensors, ..*device };
                 if !self.proof.is_shown() {
                     may_become(self.plan.device(), &device)?;
                 }
@@ -135,7 +149,19 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
         self.hello_due = true;
         self.crash_due = true;
         self.sequence = 0;
+        self.tell_heat();
         self.order(Order::Heartbeat)
+    }
+
+    /// Says how long the torque is held to the continuous one, if it is: since power-up, for the
+    /// winding's time constant.
+    fn tell_heat(&mut self) {
+        let limits = &self.plan.device().limits;
+        let passed = u16::try_from(self.now / u64::from(TICK_HZ)).unwrap_or(u16::MAX);
+        let seconds = limits.winding_time_s.saturating_sub(passed);
+        if !self.knows_heat && seconds > 0 && limits.continuous_torque < limits.torque {
+            self.event(self.now, EventKind::HeatUnknown { seconds });
+        }
     }
 
     fn stop(&mut self) {
@@ -220,7 +246,8 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
         if !self.in_session {
             return Err(CommandRefusal::NoSession);
         }
-        if let Some(interlock) = self.interlocks.first() {
+        let missing = self.fitted.and_then(|fitted| self.plan.device().sensors.missing_in(fitted));
+        if let Some(interlock) = self.interlocks.first().or(missing) {
             return Err(CommandRefusal::Interlocked(interlock));
         }
         self.fault.map_or(Ok(()), |fault| Err(CommandRefusal::Faulted(fault)))

@@ -20,7 +20,7 @@ pub mod pins;
 pub mod plant;
 mod probe;
 pub mod processor;
-mod record;
+pub mod record;
 mod rtt;
 mod run;
 mod snapshot;
@@ -37,6 +37,7 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
 
+use control_core::Device;
 use rigless::emulator::{self, Start};
 use rigless::image::Image;
 use rigless::session::Session;
@@ -231,7 +232,7 @@ impl Board {
         let (probe, flash) = (Probe::default(), flash::Flash::default());
         flash.array().supply = wiring.supply;
         if wiring.commissioned {
-            record::commission(&mut flash.array());
+            record::save(&mut flash.array(), &Device::commissioned_virtual());
         }
         let machine = Machine::new(&wiring, key, probe.clone(), flash.clone())
             .map_err(|error| refuse(error.to_string()))?;
@@ -301,6 +302,21 @@ impl Board {
             let _ = answer.send(visit(stopped));
         })));
         answered.recv().expect("the visit was made")
+    }
+
+    /// Leaves word of a cold motor in the memory that no start-up clears, as after a reset: without
+    /// it the firmware does not know how warm it is.
+    ///
+    /// # Panics
+    ///
+    /// When the image has no such memory.
+    pub fn cool_motor(&mut self) {
+        let words = self.symbols.iter().find(|symbol| symbol.name.contains("LAST_WORDS"));
+        let end = words.map(|symbol| symbol.address + symbol.size).expect("the last words");
+        let is_left = self.at_stop(move |stopped| {
+            stopped.set_word((end - 8).into(), 0) && stopped.set_word((end - 4).into(), u32::MAX)
+        });
+        assert!(is_left, "the last words are in RAM");
     }
 
     /// The probe on the core: counts by interrupt, and jumps.

@@ -35,8 +35,12 @@ impl ConfigFlash for Cells<'_> {
     }
 }
 
-/// The default device, commissioned.
-pub(super) fn commission(array: &mut Array) {
+/// Saves a device's record in a blank array.
+///
+/// # Panics
+///
+/// When it is not blank.
+pub fn save(array: &mut Array, device: &Device) {
     let (mut store, ..) = Store::open(Cells(array));
-    store.save_device(&Device::commissioned_virtual(), || true).expect("a blank array has room");
+    store.save_device(device, || true).expect("a blank array has room");
 }

@@ -1,5 +1,6 @@
 //! The board between two instructions: what a test looks at, and what it does to the board.
 
+use control_core::config::Sensors;
 use rigless::device::Level;
 use rigless::emulator::Host;
 use rigless::session::{Reset, Session};
@@ -49,6 +50,12 @@ impl Stopped<'_> {
     /// Has the amplifier say that it is ready or not.
     pub fn set_amplifier_ready(&mut self, ready: bool) {
         self.drive_line(1, if ready { Contact::Closed } else { Contact::Open });
+    }
+
+    /// Plugs the optional sensors in or off.
+    pub fn set_fitted(&mut self, Sensors { encoder_supply, current }: Sensors) {
+        (self.world.wiring.supply_sense, self.world.wiring.current_monitor) = (encoder_supply, current);
+        self.drive_line(2, Contact::closed_if(current));
     }
 
     fn drive_line(&mut self, line: usize, contact: Contact) {

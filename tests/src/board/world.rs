@@ -79,7 +79,7 @@ impl Contact {
         }
     }
 
-    fn closed_if(is_closed: bool) -> Self {
+    pub(super) fn closed_if(is_closed: bool) -> Self {
         if is_closed { Self::Closed } else { Self::Open }
     }
 }

@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 use std::time::Duration;
 
 use control_core::Device;
-use control_core::config::SafetyConfig;
+use control_core::config::{SafetyConfig, Sensors};
 use control_core::event::State;
 use control_core::excitation::{Excitation, GENTLE_TORQUE, Servo, Signal};
 use control_core::interlock::Interlock;
@@ -15,11 +15,12 @@ use control_core::units::{Damping, Millimetres, MillinewtonMetres, Stiffness};
 use device_sim::error::Error;
 use fixed::types::I16F16;
 use lab::commission::bench::{Act, Line};
-use lab::commission::{CommissioningOutcome, Wish, commission};
+use lab::commission::{CommissioningOutcome, WeighWish, Wish, commission, weigh};
 use link::Command;
+use link::commissioning::Record;
 use link::frames::CommandRefusal;
 use tests::board::wires::{Wire, Wires};
-use tests::board::{Board, Wiring, plant};
+use tests::board::{Board, MILLISECOND, Nanos, Wiring, plant};
 use tests::needle::Needle;
 use tests::pc::{Pc, open_port};
 use tests::rig::{Rig, ZERO_TORQUE};
@@ -98,6 +99,56 @@ fn a_board_without_a_record_starts_only_once_it_is_commissioned() {
     pc.must(&mut board, Command::Start);
 }
 
+/// A board whose sensor came off would go on without the protection that it was commissioned with.
+#[test]
+fn a_sensor_that_came_off_since_commissioning_prevents_a_start() {
+    const ALL: Sensors = Sensors { encoder_supply: true, current: true };
+    let needle = Needle::held_at(0.0);
+    needle.change(|state| state.hand = None);
+    let wiring =
+        Wiring { commissioned: false, supply_sense: true, current_monitor: true, ..Wiring::default() };
+    let mut board = board_wired(wiring, needle.plant());
+    let mut pc = Pc::new();
+    pc.connect(&mut board);
+    pc.must(&mut board, ramps(GENTLE_TORQUE, 0.0));
+    pc.run_ms(&mut board, 600);
+    pc.must(&mut board, Command::Commission);
+    let start_with = |board: &mut Board, pc: &mut Pc, fitted, command: Option<Command>| {
+        board.at_stop(move |stopped| {
+            stopped.set_fitted(fitted);
+            stopped.reset_by_pin();
+        });
+        board.run_ms(20);
+        pc.connect(board);
+        pc.run_ms(board, 200);
+        pc.must(board, Command::Zero);
+        command.into_iter().for_each(|command| pc.must(board, command));
+        let answer = pc.command(board, Command::Start).result;
+        pc.must(board, Command::Stop);
+        pc.run_ms(board, 50);
+        answer
+    };
+    let refused = |interlock| Err(CommandRefusal::Interlocked(interlock));
+    for (fitted, wanted) in [
+        (Sensors { current: false, ..ALL }, refused(Interlock::CurrentUnmeasured)),
+        (ALL, Ok(())),
+        (Sensors { encoder_supply: false, ..ALL }, refused(Interlock::EncoderSupplyUnsensed)),
+    ] {
+        assert_eq!(start_with(&mut board, &mut pc, fitted, None), wanted, "{fitted:?}");
+    }
+    pc.must(&mut board, Command::ReportDevice);
+    pc.run_ms(&mut board, 50);
+    let record = pc.heard.record.expect("the device's record");
+    assert_eq!(record.device.sensors, ALL, "it is in the record");
+    // A command does not make it forget one; a record of its own of before does.
+    let old = Device { sensors: Sensors::default(), ..record.device };
+    let sealed = Record::of(&old, pc.heard.hello.as_ref().expect("a hello").identity);
+    let claimed = pc.must_not(&mut board, Command::ConfigureDevice(old));
+    assert_eq!(claimed, CommandRefusal::Commissioned(Field::Sensors));
+    let restored = Some(Command::RestoreDevice(sealed));
+    assert_eq!(start_with(&mut board, &mut pc, Sensors::default(), restored), Ok(()));
+}
+
 #[test]
 fn a_patient_does_not_commission_a_device() {
     let mut board = board_wired(Wiring { commissioned: false, ..Wiring::default() }, plant::held());
@@ -168,6 +219,8 @@ struct Bench {
     needle: Needle,
     /// The position at which the hand stops, in m.
     end: Option<f64>,
+    /// The weight on the needle, N, and the instant at which the hand begins to let it go.
+    hung: (f64, Nanos),
 }
 
 /// The needle's roller in mm, and how fast a hand turns it, in m/s.
@@ -176,13 +229,16 @@ const HAND_SPEED: f64 = 0.06;
 
 impl Bench {
     fn new(reversed: bool, wires: Wires) -> Self {
+        Self::on(Wiring { commissioned: false, ..Wiring::default() }, reversed, wires)
+    }
+
+    fn on(wiring: Wiring, reversed: bool, wires: Wires) -> Self {
         let needle = Needle::held_at(0.0);
         needle.change(|state| (state.hand, state.reversed) = (None, reversed));
-        let unknown = Wiring { commissioned: false, ..Wiring::default() };
-        let mut board = board_wired(unknown, needle.plant());
+        let mut board = board_wired(wiring, needle.plant());
         board.at_stop(move |stopped| stopped.set_wires(wires));
         open_port(&mut board);
-        Self { board, needle, end: None }
+        Self { board, needle, end: None, hung: (0.0, 0) }
     }
 
     fn commission(&mut self) -> (Result<CommissioningOutcome, Error>, bool) {
@@ -201,6 +257,9 @@ impl Line for Bench {
         let out = out.to_vec();
         self.board.at_stop(move |stopped| stopped.usb().host.write(&out));
         self.board.run_ms(1);
+        let (weight, since) = self.hung;
+        let let_go = ((self.board.now() - since) as f64 / (3_000 * MILLISECOND) as f64).min(1.0);
+        self.needle.change(|state| state.pull = weight * let_go);
         let end = self.end;
         self.needle.change(|state| {
             if let (Some(at), Some(end)) = (state.hand, end)
@@ -216,6 +275,10 @@ impl Line for Bench {
     fn act(&mut self, act: Act) {
         let from = self.needle.state().depth;
         let way = match act {
+            Act::Hang(grams) => {
+                self.hung = (9.81e-3 * grams, self.board.now());
+                None
+            }
             Act::HandsOff => None,
             Act::Turn(turns) => Some(TAU * f64::from(turns) * ROLLER_MM * 1e-3),
             Act::Pull(mm) => Some(mm * 1e-3),
@@ -285,4 +348,29 @@ fn a_dead_channel_is_named_before_the_motor_moves() {
     pc.hello(&mut bench.board);
     pc.must(&mut bench.board, Command::Zero);
     assert_eq!(pc.must_not(&mut bench.board, Command::Start), NOT_COMMISSIONED);
+}
+
+/// Takes more than 5 s: 25 s of the board each, on a motor that gives half and twice of what it is
+/// asked for, and on one that was commissioned with insertion taken for withdrawal.
+#[test]
+fn a_weight_on_the_needle_corrects_a_wrong_torque_constant() {
+    let wish = WeighWish { grams: 100.0, correct: true };
+    for gain in [0.5, 2.0] {
+        let mut bench = Bench::on(Wiring::default(), false, Wires::default());
+        bench.needle.change(|state| state.gain = gain);
+        let outcome = weigh(&mut bench, &wish, |_| Ok(())).unwrap_or_else(|why| panic!("{gain}: {why}"));
+        let device = outcome.record.device;
+        let found = device.full_scale_torque.0.to_num::<f64>();
+        let within = f64::from(device.torque_uncertainty) * 1e-3;
+        println!("| a motor of {gain} times its torque | {found:.2} mN·m within {:.1} % |", 1e2 * within);
+        let off = (found / (28.8 * gain) - 1.0).abs();
+        assert!(outcome.is_corrected && off <= within && within < 0.1, "{gain}: {found}, {within}");
+        assert!(device.commissioned && device.limits.torque <= device.full_scale_torque);
+        let mass = device.mechanism.mass.0.to_num::<f64>();
+        assert!((mass / 30.0 - 1.0).abs() < 0.15, "{gain}: {mass} g of 30");
+    }
+    let swapped = Wires { swapped: true, ..Wires::default() };
+    let mut bench = Bench::on(Wiring::default(), true, swapped);
+    let why = weigh(&mut bench, &wish, |_| Ok(())).expect_err("the other way round").to_string();
+    assert!(why.contains("outwards") && why.contains("commission again"), "{why}");
 }

@@ -1,14 +1,16 @@
 //! Faults take torque away in time, are reported, and stay until a person starts again.
 
-use control_core::Config;
 use control_core::event::{Fault, Limits};
+use control_core::interlock::Interlock;
 use control_core::units::MillinewtonMetres;
+use control_core::{Config, Device};
 use fixed::types::I16F16;
 use link::Command;
-use link::frames::EventKind;
+use link::frames::{CommandRefusal, EventKind};
 use tests::board::tilt::{Health, Model};
-use tests::board::{Effect, MILLISECOND, Nanos, Wiring, plant};
-use tests::rig::{PRESSED, Rig, task};
+use tests::board::{Board, Effect, MILLISECOND, Nanos, Wiring, firmware_path, plant, record};
+use tests::pc::Pc;
+use tests::rig::{PRESSED, Rig, ZERO_TORQUE, task};
 
 const TICK: Nanos = 100_000;
 /// A fault that a tick can see ends within two ticks; looking at the pins adds 10 µs.
@@ -69,6 +71,27 @@ fn an_accelerometer_that_is_stuck() {
     tilt_fault(Model::Lis302dl, Health::Stuck, 120 * MILLISECOND);
     tilt_fault(Model::Lis3dsh, Health::Stuck, 120 * MILLISECOND);
     tilt_fault(Model::Lis3dsh, Health::Frozen, 600 * MILLISECOND);
+}
+
+/// A sensor that does not measure gives no torque, not even for the milliseconds of a fault.
+#[test]
+fn a_start_with_a_dead_tilt_sensor_is_refused() {
+    for health in [Health::Absent, Health::Nonsense, Health::Stuck, Health::Frozen] {
+        let mut rig = Rig::zeroed(Wiring::default());
+        let becomes = |rig: &mut Rig, health| {
+            rig.board.at_stop(move |stopped| stopped.tilt().expect("an accelerometer").health = health);
+            rig.pc.run_ms(&mut rig.board, 700);
+        };
+        becomes(&mut rig, health);
+        let since = rig.board.now();
+        let answer = rig.pc.command(&mut rig.board, Command::Start).result;
+        rig.pc.run_ms(&mut rig.board, 50);
+        let on = rig.enabled_since(since);
+        assert!(on.is_empty(), "{health:?}: answered {answer:?}, the amplifier on at {on:?}");
+        assert_eq!(answer, Err(CommandRefusal::Interlocked(Interlock::TiltSensor)), "{health:?}");
+        becomes(&mut rig, Health::Good);
+        rig.pc.must(&mut rig.board, Command::Start);
+    }
 }
 
 /// It answers as before, and is in power-down: it needs its configuration again, and the device
@@ -300,6 +323,43 @@ fn nothing_drives_the_motor_before_the_first_tick_after_a_reset() {
         stopped.log().put_out.iter().filter(|output| output.at > since).map(|output| output.code).collect()
     });
     assert!(codes.iter().all(|&code| code == tests::rig::ZERO_TORQUE), "{codes:?}");
+}
+
+/// RAM without power has forgotten how warm the motor is: no more than its continuous torque until
+/// the winding's time constant has passed, whatever was given before, and the PC is told how long.
+#[test]
+fn a_power_loss_limits_the_torque_until_the_motor_has_cooled() {
+    let mut device = Device::commissioned_virtual();
+    device.limits.continuous_torque = MillinewtonMetres(I16F16::const_from_int(3));
+    device.limits.winding_time_s = 3;
+    let hand = plant::by_hand(plant::path(vec![(400 * MILLISECOND, 0), (600 * MILLISECOND, PRESSED)]));
+    let board = Board::on(&firmware_path(), Wiring { commissioned: false, ..Wiring::default() }, hand);
+    let mut rig = Rig { board: board.expect("an image"), pc: Pc::new() };
+    record::save(&mut rig.board.flash().array(), &device);
+    rig.pc.connect(&mut rig.board);
+    rig.pc.must(&mut rig.board, Command::Zero);
+    let left = 700 - rig.board.now() / MILLISECOND;
+    rig.pc.run_ms(&mut rig.board, left);
+    let largest = |rig: &mut Rig| {
+        rig.pc.must(&mut rig.board, Command::Start);
+        let since = rig.board.now();
+        rig.pc.run_ms(&mut rig.board, 500);
+        rig.pc.must(&mut rig.board, Command::Stop);
+        let codes = rig.board.at_stop(move |stopped| {
+            let outputs = stopped.log().put_out.iter().filter(|output| output.at > since);
+            outputs.map(|output| output.code.abs_diff(ZERO_TORQUE)).max()
+        });
+        f64::from(codes.expect("the converter was written")) * 28.8 / 2_047.0
+    };
+    let told = |rig: &Rig| rig.pc.heard_event(|kind| *kind == EventKind::HeatUnknown { seconds: 3 });
+    let unknown = largest(&mut rig);
+    println!("| torque after a power loss | {unknown:.2} mN·m of 3 |");
+    assert!((2.9..=3.02).contains(&unknown), "{unknown} mN·m while nobody knows how warm it is");
+    assert!(told(&rig), "the PC counts down: {:?}", rig.pc.heard.events);
+    rig.pc.run_ms(&mut rig.board, 3_500);
+    let cooled = largest(&mut rig);
+    println!("| and once it must have cooled | {cooled:.2} mN·m |");
+    assert!(cooled > 5.0, "{cooled} mN·m");
 }
 
 #[test]

@@ -281,7 +281,7 @@ pub(super) fn tick() -> (Tick<Fake>, &'static Shared, TelemetryEnds) {
     let shared = shared();
     let (tick_ends, _, (telemetry, _)) = ends();
     let drive = Drive::new(Two { wide: Part, narrow: Eight }, Part);
-    (Tick::new(shared, (Part, Part, drive), &plan(), 0, tick_ends), shared, telemetry)
+    (Tick::new(shared, (Part, Part, drive), &plan(), Some(0), tick_ends), shared, telemetry)
 }
 
 /// Runs `tick` as often, with the clock and a supervisor that is alive.

@@ -35,7 +35,8 @@ impl Desk {
         let identity = Identity { firmware: [1, 2, 3], ..Identity::VIRTUAL };
         let blank = || std::vec![u32::MAX; Words::CELLS * CELL_WORDS];
         let (store, ..) = Store::open(Words([blank(), blank()]));
-        let telemetry = Telemetry::new(shared, (identity, &plan(), None, None), store, telemetry_ends, Part);
+        let telemetry =
+            Telemetry::new(shared, (identity, &plan(), None, None, true), store, telemetry_ends, Part);
         shared.link.store(LINK_CONFIGURED | LINK_READY, Relaxed);
         Self { telemetry, shared, tick, usb, commands: Commands::default(), reception: Reception::default() }
     }

@@ -53,7 +53,7 @@ fn the_supervisor_feeds_while_all_report_and_wakes_everybody() {
 #[test]
 fn a_cause_is_an_interlock_and_under_torque_a_fault() {
     type Break = fn();
-    let all: [(Break, Interlock); 4] = [
+    let all: [(Break, Interlock); 5] = [
         (|| world().supply_low.set(true), Interlock::Supply),
         (|| world().wire_off.set(true), Interlock::EncoderWire),
         (
@@ -64,17 +64,22 @@ fn a_cause_is_an_interlock_and_under_torque_a_fault() {
             || world().readings.set(Readings { ready: false, ..world().readings.get() }),
             Interlock::AmplifierNotReady,
         ),
+        (|| world().tilt.set(Some(Reading::Failed(TiltError::Absent))), Interlock::TiltSensor),
     ];
     for powered in [false, true] {
         for (breaks, interlock) in all {
             world().supply_low.set(false);
             world().wire_off.set(false);
             let (mut watch, shared) = supervisor();
+            let mut tilt: Tilt<Fake> = Tilt::new(shared, Part);
+            world().tilt.set(Some(Reading::New(Milliradians(0))));
+            tilt.run();
             shared.powered.store(powered, Relaxed);
             world().readings.set(Readings { enable_line: powered, ..world().readings.get() });
             supervise(&mut watch, shared, 10);
             assert_eq!((shared.conditions.get().first(), shared.trips.is_empty()), (None, true));
             breaks();
+            (0..10).for_each(|_| tilt.run());
             supervise(&mut watch, shared, 2);
             assert_eq!(shared.conditions.get().first(), Some(interlock));
             assert_eq!(shared.trips.take(), powered.then_some(interlock.fault()), "{interlock:?}");
@@ -93,18 +98,27 @@ fn a_low_enable_line_is_a_fault_only_under_torque() {
 }
 
 #[test]
-fn the_tilt_task_gives_what_it_measures_and_trips_under_torque() {
+fn a_device_starts_only_with_a_tilt_sensor_that_measures() {
     let shared = shared();
     let mut tilt: Tilt<Fake> = Tilt::new(shared, Part);
-    world().tilt.set(Some(Reading::New(Milliradians(-321))));
-    tilt.run();
+    let mut after = |readings: u32, reading| {
+        world().tilt.set(Some(reading));
+        (0..readings).for_each(|_| tilt.run());
+        shared.conditions.get().first()
+    };
+    let (measures, absent) = (Reading::New(Milliradians(-321)), Reading::Failed(TiltError::Absent));
+    let missing = Some(Interlock::TiltSensor);
+    assert_eq!(shared.conditions.get().first(), missing, "it has not measured yet");
+    assert_eq!(after(1, Reading::Unchanged), missing);
+    assert_eq!(after(1, absent), missing);
+    assert_eq!(after(1, measures), None);
     assert_eq!(shared.tilt(), Milliradians(-321));
-    world().tilt.set(Some(Reading::Failed(TiltError::Absent)));
-    (0..100).for_each(|_| tilt.run());
+    assert_eq!(after(9, absent), None, "one bad transfer is not enough");
+    assert_eq!(after(1, absent), missing);
+    assert_eq!(after(1, Reading::Unchanged), missing, "an answer is no measurement");
+    assert_eq!(after(1, measures), None, "it has recovered");
+    assert_eq!(after(100, Reading::Unchanged), missing, "stuck");
     assert!(shared.trips.is_empty(), "torque is off");
-    shared.powered.store(true, Relaxed);
-    tilt.run();
-    assert_eq!(shared.trips.take(), Some(Fault::Tilt));
 }
 
 #[test]

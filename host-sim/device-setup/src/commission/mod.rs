@@ -3,9 +3,11 @@
 //! motor moves with at most 2 mN·m: more the device itself refuses until it has been commissioned.
 
 pub mod findings;
+pub mod weigh;
 
 use crate::bench::{Act, Bench, Line, ticks};
 use control_core::compensation::Compensation;
+use control_core::config::Sensors;
 use control_core::event::Fault;
 use control_core::excitation::{Excitation, GENTLE_TORQUE, Servo, Signal};
 use control_core::units::{Damping, Millimetres, Milliradians, Stiffness};
@@ -57,12 +59,17 @@ pub enum CommissioningStep {
     PointDown,
     /// The motor moves.
     Pulses,
+    /// The needle straight down, moved by the motor with nothing on it.
+    PointStraightDown,
+    /// The same with a weight of so many g.
+    HangWeight(f64),
 }
 
 impl CommissioningStep {
     /// True if the motor moves in it.
     pub fn moves(self) -> bool {
-        self == CommissioningStep::Pulses
+        use CommissioningStep::{HangWeight, PointStraightDown, Pulses};
+        matches!(self, Pulses | PointStraightDown | HangWeight(_))
     }
 }
 
@@ -87,6 +94,13 @@ impl fmt::Display for CommissioningStep {
                 f,
                 "the motor moves now: {PULSES} pulses both ways, of at most 2 mN·m, {} s in all; the needle out and hands off the roller",
                 f64::from(PULSES) * f64::from(PULSE_MS) * 2e-3
+            ),
+            CommissioningStep::PointStraightDown => f.write_str(
+                "fix the needle straight down, nothing on it, and let go: after four seconds the motor moves it slowly down and up by 6 mm, for 10 s",
+            ),
+            CommissioningStep::HangWeight(grams) => write!(
+                f,
+                "hang {grams} g on the needle and hold them up, a soft pad below: the motor moves now, slowly down and up by 6 mm; let the weight go gently within three seconds; after 10 s the torque goes off and it falls"
             ),
         }
     }
@@ -139,14 +153,23 @@ impl CommissioningOutcome {
                 }
             ),
             format!("tilt with the needle flat {} mrad", device.skin_tilt.0),
+            format!(
+                "encoder's supply {}, motor's current {}",
+                if device.sensors.encoder_supply { "sensed: no start without it" } else { "not sensed" },
+                if device.sensors.current { "measured: no start without it" } else { "not measured" },
+            ),
         ]
     }
 
     /// Returns the device's part as a file, with the findings as comments.
     pub fn to_toml(&self, name: &str) -> Result<String, Error> {
-        let found: String = self.lines().iter().map(|line| format!("# {line}\n")).collect();
-        Ok(found + &device_config::to_toml(name, &self.record)?)
+        to_toml(name, &self.lines(), &self.record)
     }
+}
+
+fn to_toml(name: &str, lines: &[String], record: &Record) -> Result<String, Error> {
+    let found: String = lines.iter().map(|line| format!("# {line}\n")).collect();
+    Ok(found + &device_config::to_toml(name, record)?)
 }
 
 impl From<CommissioningError> for Error {
@@ -166,7 +189,14 @@ pub async fn commission(
     let before = bench.device().await?;
     // Whatever it was: until it has passed again it is not commissioned, and the forces that were
     // found are another device's.
-    let mut device = Device { commissioned: false, compensation: Compensation::NONE, ..before };
+    let mut device = Device {
+        commissioned: false,
+        compensation: Compensation::NONE,
+        sensors: Sensors::default(),
+        // Found with another roller.
+        torque_uncertainty: 0,
+        ..before
+    };
     let rests = |samples: &[_]| findings::has_moved_and_rests(samples, ticks(REST));
 
     ask(CommissioningStep::Turn(wish.turns)).await?;
@@ -194,20 +224,33 @@ pub async fn commission(
     device.limits.stiffness = before.limits.stiffness.min(stiffest(&device));
     bench.configure(&device).await?;
 
+    let outcome = prove(&mut bench, &mut device, before.limits.stiffness, &mut ask).await?;
+    Ok(CommissioningOutcome { channels_swapped, ..outcome })
+}
+
+/// Has the device prove itself by pulses under its new part and gives it what they show. Earlier it
+/// allowed this `stiffness`.
+async fn prove(
+    bench: &mut Bench<'_>,
+    device: &mut Device,
+    stiffness: Stiffness,
+    ask: &mut impl AsyncFnMut(CommissioningStep) -> Result<(), Error>,
+) -> Result<CommissioningOutcome, Error> {
     ask(CommissioningStep::Pulses).await?;
     bench.settle().await?;
-    let (mechanism, leads_reversed) = find_mechanism(&mut bench, &mut device).await?;
-    device.dac_zero = findings::converter_zero(&device, mechanism.offset)?;
+    let (mechanism, leads_reversed) = find_mechanism(bench, device).await?;
+    let radius_mm = device.roller_radius.0.to_num();
+    device.dac_zero = findings::converter_zero(device, mechanism.offset)?;
     device.mechanism = findings::along_the_needle(&mechanism, radius_mm, device.mechanism.delay_us);
     // Never above what the pulses were driven with: the device takes nothing higher than it has
     // proved.
-    device.limits.stiffness = device.limits.stiffness.min(stiffest(&device));
-    let stiffness_lowered = device.limits.stiffness < before.limits.stiffness;
-    bench.configure(&device).await?;
-    let record = bench.commission(&device).await?;
+    device.limits.stiffness = device.limits.stiffness.min(stiffest(device));
+    let stiffness_lowered = device.limits.stiffness < stiffness;
+    bench.configure(device).await?;
+    let record = bench.commission(device).await?;
     Ok(CommissioningOutcome {
         record,
-        channels_swapped,
+        channels_swapped: false,
         leads_reversed,
         radius_mm,
         mechanism,

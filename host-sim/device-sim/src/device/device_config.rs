@@ -8,7 +8,7 @@ use super::winding::Winding;
 use crate::error::Error;
 use crate::named_files::{self, Text};
 use crate::profile::fix;
-use control_core::config::{DacWidth, Mechanism, SafetyConfig, SpeedMethod};
+use control_core::config::{DacWidth, Mechanism, SafetyConfig, Sensors, SpeedMethod};
 use control_core::units::{Damping, Grams, Millimetres, MillinewtonMetres, Milliradians, Newtons, Stiffness};
 use control_core::{Device, Patient, Plan};
 use fixed::types::I8F24;
@@ -87,6 +87,8 @@ struct File {
     control: Control,
     #[serde(default)]
     mechanism: Moving,
+    #[serde(default)]
+    sensors: Fitted,
     compensation: Option<Compensated>,
     grip: Option<Grip>,
     motor: Option<Winding>,
@@ -99,6 +101,8 @@ struct Drive {
     counts_per_turn: Option<u16>,
     encoder_reversed: Option<bool>,
     full_scale_torque_mnm: Option<f64>,
+    /// Two standard deviations, as a weight on the needle has shown it.
+    full_scale_uncertainty_percent: Option<f64>,
     dac_bits: Option<u8>,
     dac_zero_codes: Option<i16>,
     motor_reversed: Option<bool>,
@@ -126,6 +130,14 @@ struct Moving {
     mass_g: Option<f64>,
     dry_friction_n: Option<f64>,
     delay_us: Option<u16>,
+}
+
+/// The optional sensors that commissioning found.
+#[derive(Default, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+struct Fitted {
+    encoder_supply: bool,
+    current: bool,
 }
 
 #[derive(Default, Deserialize, Serialize)]
@@ -165,6 +177,12 @@ impl File {
         if let Some(torque) = drive.full_scale_torque_mnm {
             device.full_scale_torque = MillinewtonMetres(fix("full_scale_torque_mnm", torque)?);
         }
+        if let Some(percent) = drive.full_scale_uncertainty_percent {
+            if !(0.0..=100.0).contains(&percent) {
+                return Err(format!("full_scale_uncertainty_percent is {percent}; it must be from 0 to 100"));
+            }
+            device.torque_uncertainty = (percent * 10.0).round() as u16;
+        }
         if let Some(bits) = drive.dac_bits {
             device.dac =
                 DacWidth::try_from(bits).map_err(|_| format!("dac_bits is {bits}; it must be 8 to 16"))?;
@@ -190,6 +208,8 @@ impl File {
             device.passivity_damping = damping("passivity_damping_n_s_per_mm", value)?;
         }
         self.mechanism.set(&mut device.mechanism)?;
+        let Fitted { encoder_supply, current } = self.sensors;
+        device.sensors = Sensors { encoder_supply, current };
         if let Some(compensation) = &self.compensation {
             device.compensation = compensation.compensation()?;
         }
@@ -214,6 +234,8 @@ impl File {
                 counts_per_turn: Some(device.counts_per_turn),
                 encoder_reversed: Some(device.encoder_reversed),
                 full_scale_torque_mnm: Some(device.full_scale_torque.0.to_num()),
+                full_scale_uncertainty_percent: (device.torque_uncertainty > 0)
+                    .then(|| f64::from(device.torque_uncertainty) / 10.0),
                 dac_bits: Some(device.dac.bits()),
                 dac_zero_codes: Some(device.dac_zero),
                 motor_reversed: Some(device.motor_reversed),
@@ -242,6 +264,10 @@ impl File {
                 mass_g: Some(device.mechanism.mass.0.to_num()),
                 dry_friction_n: Some(device.mechanism.dry_friction.0.to_num()),
                 delay_us: Some(device.mechanism.delay_us),
+            },
+            sensors: Fitted {
+                encoder_supply: device.sensors.encoder_supply,
+                current: device.sensors.current,
             },
             // It is the ceiling of torque that a device keeps of it.
             grip: None,
@@ -317,6 +343,8 @@ mod tests {
             skin_tilt: Milliradians(-123),
             speed: SpeedMethod::EdgeTiming,
             counts_per_turn: 2_048,
+            sensors: Sensors { encoder_supply: true, current: false },
+            torque_uncertainty: 17,
             ..Device::commissioned_virtual()
         };
         device.limits.winding_time_s = 30;

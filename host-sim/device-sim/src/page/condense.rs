@@ -138,6 +138,11 @@ impl Condenser {
             EventKind::FarWall { layer } => ("far_wall", Some(layer), None, None),
             EventKind::Barrier => ("barrier", None, None, None),
             EventKind::InTrack { layer } => ("in_track", Some(layer), None, None),
+            EventKind::HeatUnknown { .. } => ("heat_unknown", None, None, None),
+        };
+        let ends_in_s = match event.kind {
+            EventKind::HeatUnknown { seconds } => Some(seconds),
+            _ => None,
         };
         messages::Event {
             t_s: self.seconds(event.tick),
@@ -147,6 +152,7 @@ impl Condenser {
             force_n: before.map(|pose| fine(pose.force.0.to_num())),
             cause,
             limits,
+            ends_in_s,
         }
     }
 }

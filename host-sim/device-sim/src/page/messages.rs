@@ -131,7 +131,7 @@ pub struct Event {
     /// Its time, in s.
     pub t_s: f64,
     /// `contact`, `puncture`, `vessel`, `exit`, `fault`, `limits`, `started`, `stopped`,
-    /// `flashback`, `far_wall`, `barrier` or `other`.
+    /// `flashback`, `far_wall`, `barrier`, `heat_unknown` or `other`.
     pub kind: &'static str,
     /// The layer it is about, outermost 0.
     pub layer: Option<u8>,
@@ -143,6 +143,9 @@ pub struct Event {
     pub cause: Option<String>,
     /// Limits in force since then, as in [`Pose::limits`].
     pub limits: Option<u8>,
+    /// Seconds from then on for which the motor's heat is unknown and its torque held to the
+    /// continuous one.
+    pub ends_in_s: Option<u16>,
 }
 
 /// Times of the device's stages.

@@ -90,6 +90,11 @@ impl BareDevice {
         })
     }
 
+    /// The same, wired as `wiring`.
+    pub fn wired(self, wiring: Wiring) -> Self {
+        Self { wiring, ..self }
+    }
+
     /// The same before anybody has commissioned it, wired as `wiring`.
     pub fn uncommissioned(self, wiring: Wiring) -> Result<Self, Error> {
         let device = Device::default();

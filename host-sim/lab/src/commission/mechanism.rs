@@ -14,6 +14,8 @@ use std::time::Duration;
 /// N·m/rad and N·m·s/rad.
 const HAND_SPEED: f64 = 6.0;
 const GRIP: (f64, f64) = (0.2, 1.0e-3);
+/// A hand lets a weight go gently: s.
+const LETS_GO_S: f64 = 3.0;
 /// A hand tilts slowly: rad/s.
 const TILT_SPEED: f64 = 0.5;
 
@@ -26,6 +28,8 @@ pub struct VirtualLine {
     /// The angle at which the hand holds the roller, and the one that it moves to, rad.
     held: Option<(f64, f64)>,
     tilt: f64,
+    /// The weight on the needle, N, and the tick at which the hand begins to let it go.
+    hung: (f64, u64),
     /// The sensor's reading with the needle level, rad, and its sign.
     sensor: (f64, f64),
 }
@@ -40,7 +44,20 @@ impl VirtualLine {
     /// The plant of `rig` on a device that has been commissioned.
     pub fn commissioned(rig: &Rig, file: &str, radius_mm: f64) -> Result<Self, Error> {
         let device = BareDevice::new(rig, file)?;
-        Ok(Self { device, radius_mm, act: Act::HandsOff, held: None, tilt: 0.0, sensor: (0.0, 1.0) })
+        Ok(Self {
+            device,
+            radius_mm,
+            act: Act::HandsOff,
+            held: None,
+            tilt: 0.0,
+            hung: (0.0, 0),
+            sensor: (0.0, 1.0),
+        })
+    }
+
+    /// The same wired as `wiring` since it was commissioned.
+    pub fn wired(self, wiring: Wiring) -> Self {
+        Self { device: self.device.wired(wiring), ..self }
     }
 
     /// A tilt sensor that reads `zero` rad with the needle level, and is mounted `sign` = ±1.
@@ -58,12 +75,15 @@ impl VirtualLine {
         if let Act::Tilt(to) = self.act {
             self.tilt += (to - self.tilt).clamp(-TILT_SPEED * dt, TILT_SPEED * dt);
         }
+        let (weight, since) = self.hung;
+        let let_go = ((self.device.ticks() - since) as f64 * dt / LETS_GO_S).min(1.0);
+        let pull = let_go * weight * self.tilt.sin() * self.radius_mm * 1e-3;
         let external = self.held.as_mut().map_or(0.0, |(at, end)| {
             *at = (*at + HAND_SPEED * dt).min(*end);
             GRIP.0 * (*at - self.device.position()) - GRIP.1 * self.device.velocity()
         });
         let (zero, sign) = self.sensor;
-        self.device.tick_under(sign * self.tilt + zero, external);
+        self.device.tick_under(sign * self.tilt + zero, external + pull);
     }
 }
 
@@ -80,8 +100,11 @@ impl Line for VirtualLine {
         let way = match act {
             Act::Turn(turns) => Some(TAU * f64::from(turns)),
             Act::Pull(mm) => Some(mm / self.radius_mm),
-            Act::HandsOff | Act::Tilt(_) => None,
+            Act::HandsOff | Act::Tilt(_) | Act::Hang(_) => None,
         };
+        if let Act::Hang(grams) = act {
+            self.hung = (grams * 9.81e-3, self.device.ticks());
+        }
         let from = self.device.position();
         self.held = way.map(|way| (from, from + way));
     }

@@ -4,6 +4,7 @@
 pub mod bench;
 pub mod mechanism;
 
+pub use device_setup::commission::weigh::{WeighOutcome, WeighWish};
 pub use device_setup::commission::{CommissioningOutcome, CommissioningStep, Wish, findings};
 
 use bench::Line;
@@ -18,4 +19,13 @@ pub fn commission(
     mut ask: impl FnMut(CommissioningStep) -> Result<(), Error>,
 ) -> Result<CommissioningOutcome, Error> {
     block_on(device_setup::commission::commission(line, wish, async |step| ask(step)))
+}
+
+/// Weighs with the commissioned device behind `line`; `ask` as for [`commission`].
+pub fn weigh(
+    line: &mut dyn Line,
+    wish: &WeighWish,
+    mut ask: impl FnMut(CommissioningStep) -> Result<(), Error>,
+) -> Result<WeighOutcome, Error> {
+    block_on(device_setup::commission::weigh::weigh(line, wish, async |step| ask(step)))
 }
