@@ -3,6 +3,7 @@
 //! oldest block first, and counted.
 
 mod commands;
+mod guard;
 mod upload;
 mod waiting;
 
@@ -20,6 +21,7 @@ use control_core::event::{Fault, Limits};
 use control_core::interlock::Interlocks;
 use control_core::{AnyOrder, Plan, TICK_HZ, TickOutput};
 use core::borrow::BorrowMut;
+use guard::Guard;
 use heapless::HistoryBuf;
 pub use upload::LATE_TICKS;
 use upload::Upload;
@@ -66,6 +68,7 @@ pub struct Endpoint<W = Waiting> {
     zeroed: bool,
     proof: Proof,
     interlocks: Interlocks,
+    guard: Guard,
     limits: Limits,
     fault: Option<Fault>,
     crash: Option<Crash>,
@@ -104,6 +107,7 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
             zeroed: false,
             proof: Proof::None,
             interlocks: Interlocks::default(),
+            guard: Guard::default(),
             limits: Limits::default(),
             fault: reset_cause,
             crash: None,

@@ -269,6 +269,47 @@ pub enum CommandRefusal {
     NotShown,
     /// A sequence, or one of its segments, is not taken; what was uploaded is forgotten.
     Sequence(SequenceRefusal),
+    /// No brown-out reset guards the supply yet.
+    Guard(GuardRefusal),
+}
+
+/// The reason why no brown-out reset guards the supply.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum GuardRefusal {
+    /// It is off, and nobody asked to set it.
+    Off,
+    /// It has been set, and counts once a reset has loaded it.
+    Restart,
+    /// The option bytes are what no board has, and were left as they are.
+    Implausible(u32),
+    /// The flash was busy for too long, or an error flag says that it did not take the option
+    /// bytes.
+    NotTaken,
+    /// The supply is too low to program them.
+    SupplyLow,
+}
+
+impl core::fmt::Display for GuardRefusal {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            GuardRefusal::Off => {
+                f.write_str("the board's brown-out reset is off; run host-sim commission, which sets it")
+            }
+            GuardRefusal::Restart => f.write_str(
+                "the board's brown-out reset has been set and counts after a restart; switch the board off and on, then run host-sim commission again; if this comes again, replace the board",
+            ),
+            GuardRefusal::Implausible(options) => write!(
+                f,
+                "the board's option bytes read {options:#010x}, which cannot be right, and were left as they are; switch the board off and on, and if this comes again restore them with ST's programmer"
+            ),
+            GuardRefusal::NotTaken => f.write_str(
+                "the board's flash did not take the brown-out reset; switch the board off and on, then run host-sim commission again, or replace the board",
+            ),
+            GuardRefusal::SupplyLow => f.write_str(
+                "the board's supply is below 2.66 V; check its power, then run host-sim commission again",
+            ),
+        }
+    }
 }
 
 impl core::fmt::Display for CommandRefusal {
@@ -291,6 +332,7 @@ impl core::fmt::Display for CommandRefusal {
                 "the device was not commissioned with this configuration, and its own pulses have not shown that motor and encoder match; run host-sim commission",
             ),
             CommandRefusal::Sequence(refusal) => refusal.fmt(f),
+            CommandRefusal::Guard(refusal) => refusal.fmt(f),
         }
     }
 }
@@ -364,5 +406,12 @@ pub enum Command {
         count: u8,
         /// [`crate::codec::hash`] of the segments, as a slice.
         checksum: u32,
+    },
+    /// Check that a brown-out reset guards the supply; where it is off, set it if `set` asks for it.
+    /// Only while torque is off: it may stop the processor for a second, and is answered after
+    /// that. What was set counts after the next reset.
+    GuardSupply {
+        /// True to set it.
+        set: bool,
     },
 }

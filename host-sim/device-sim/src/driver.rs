@@ -9,7 +9,7 @@ use control_core::compensation::Gains;
 use control_core::excitation::Excitation;
 use control_core::{Device, Patient};
 use link::codec::{self, MAX_FRAME};
-use link::frames::{Ack, Command, CommandRefusal, DeviceFrame, PROTOCOL_VERSION};
+use link::frames::{Ack, Command, CommandRefusal, DeviceFrame, GuardRefusal, PROTOCOL_VERSION};
 use link::host::{Commands, Counts, Reception};
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -43,6 +43,8 @@ pub struct Driver {
     refused: Option<String>,
     /// The answer to the last request for another patient.
     changed: Option<Result<(), String>>,
+    /// The answer to the last question for the supply's guard.
+    guarded: Option<Result<(), GuardRefusal>>,
     out: Vec<u8>,
 }
 
@@ -78,6 +80,7 @@ impl Driver {
             notice: None,
             refused: None,
             changed: None,
+            guarded: None,
             out: Vec::new(),
         }
     }
@@ -162,6 +165,17 @@ impl Driver {
     /// Marks the device's configuration as found by commissioning.
     pub fn commission(&mut self) {
         self.waiting.push_back(Command::Commission);
+    }
+
+    /// Has the device check that a brown-out reset guards its supply, and set one that is off if
+    /// `set` is true. [`Self::take_guard`] returns the answer.
+    pub fn guard_supply(&mut self, set: bool) {
+        self.waiting.push_back(Command::GuardSupply { set });
+    }
+
+    /// Returns once the answer to [`Self::guard_supply`].
+    pub fn take_guard(&mut self) -> Option<Result<(), GuardRefusal>> {
+        self.guarded.take()
     }
 
     /// Has the device report its part of the configuration in force.
@@ -299,6 +313,8 @@ impl Driver {
                 self.changed = Some(Err(format!("the device refused: {why}")));
             }
             (Ok(()), Command::ConfigurePatient(_)) => self.ready = true,
+            (Ok(()), Command::GuardSupply { .. }) => self.guarded = Some(Ok(())),
+            (Err(CommandRefusal::Guard(why)), _) => self.guarded = Some(Err(why)),
             (Ok(()), Command::Start) => {
                 self.has_started = true;
                 self.notice = None;

@@ -24,6 +24,7 @@ fn needs_torque_off(command: &Command) -> bool {
             | Command::Index(_)
             | Command::Segment { .. }
             | Command::Play { .. }
+            | Command::GuardSupply { .. }
     )
 }
 
@@ -34,6 +35,11 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
             self.answered.clear();
         } else if let Some(ack) = self.answered.oldest_ordered().find(|ack| ack.id == frame.id) {
             let _ = self.waiting.borrow_mut().acks.push_back(*ack);
+            return;
+        }
+        if let Command::GuardSupply { set } = frame.command
+            && self.defer_guard(frame.id, set)
+        {
             return;
         }
         let result = self.carry_out(frame.command);
@@ -92,6 +98,8 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
             Command::Index(index) => self.order(LargeOrder::Index(index.map(Counts))),
             Command::Segment { index, excitation } => self.upload(index, excitation),
             Command::Play { count, checksum } => self.play(count, checksum),
+            // Nothing to guard: a board would have deferred it.
+            Command::GuardSupply { .. } => Ok(()),
         }
     }
 

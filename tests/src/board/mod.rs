@@ -9,6 +9,7 @@ mod amplifier;
 mod asked;
 mod bus;
 pub mod cache;
+mod clock;
 mod dac;
 pub mod elf;
 mod exti;
