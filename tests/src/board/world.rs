@@ -148,7 +148,7 @@ impl World {
             latch_at: None,
             strap_settles: None,
             amplifier: Amplifier::default(),
-            contacts: [true, true, wiring.current_monitor].map(Contact::closed_if),
+            contacts: [true, true, wiring.current_monitor || wiring.loopback].map(Contact::closed_if),
             violations: Vec::new(),
             painted: false,
             log: Log::default(),
@@ -188,8 +188,12 @@ impl World {
             self.next_step = at + self.wiring.plant_period;
             let asked = Drive { code: self.code, enabled: self.enabled };
             let drive = self.amplifier.drive(asked);
-            if self.wiring.current_monitor {
-                let millivolts = self.amplifier.monitor(asked, RAIL_MILLIVOLTS);
+            if self.wiring.current_monitor || self.wiring.loopback {
+                let millivolts = if self.wiring.loopback {
+                    u32::from(self.code.unwrap_or(0)) * RAIL_MILLIVOLTS / 4_096
+                } else {
+                    self.amplifier.monitor(asked, RAIL_MILLIVOLTS)
+                };
                 let channel =
                     adc::Channel::new(self.wiring.pins.monitor).expect("a converter has sixteen pins");
                 session.board_mut().part().adc[1].set_input(channel, millivolts);

@@ -13,6 +13,7 @@ mod instructions;
 mod lamps;
 mod log;
 mod option_bytes;
+mod own_test;
 mod rate;
 mod repeated;
 mod runaway;
