@@ -1,7 +1,8 @@
 //! Panic, hard fault, stray interrupt: the amplifier goes off, then the converters to zero torque,
 //! by direct register writes that need nothing to be in order, not even the stack. What comes then
-//! is the program's (`give_up`): the image leaves word for the next start and resets itself, so that
-//! a PC finds a device that answers and says what happened. It names no pin: those are the board's.
+//! is the program's (`give_up`): the image leaves word for the next start and resets itself, so
+//! that a PC finds a device that answers and says what happened. It names no pin: those are the
+//! board's.
 #![allow(unsafe_code, reason = "after a fault nothing that owns a register can be trusted")]
 
 use crate::board::Wires;

@@ -92,8 +92,8 @@ pub trait Watchdog {
 
 /// The lamps by which a person sees the device's state without a PC.
 pub trait Lamps {
-    /// Lights the one that says that the tasks run, the one for torque, and the one for a fault that
-    /// has latched or has ended the last run.
+    /// Lights the one that says that the tasks run, the one for torque, and the one for a fault
+    /// that has latched or has ended the last run.
     fn show(&mut self, powered: bool, fault: bool);
 }
 

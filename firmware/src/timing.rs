@@ -108,7 +108,7 @@ pub(crate) const TILT_FROZEN_MEASUREMENTS: u32 = 50;
 /// less.
 pub const TILT_SPI_HZ: u32 = 1_500_000;
 
-/// What the HAL is asked for to get it: it takes the second bus to run as out of reset.
+/// The rate to ask the HAL for to get it: it takes the second bus to run as out of reset.
 pub const TILT_SPI_ASKED_HZ: u32 = (TILT_SPI_HZ as u64 * RESET_CLOCK_HZ as u64 / APB2_HZ as u64) as u32;
 
 /// Longest time in which the configuration's flash takes a word (data sheet: 100 µs), in turns of a

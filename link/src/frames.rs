@@ -369,8 +369,8 @@ pub enum Command {
         /// [`crate::codec::hash`] of the segments, as a slice.
         checksum: u32,
     },
-    /// Check that a brown-out reset guards the supply; where it is off, set it if `set` asks for it.
-    /// Only while torque is off: it may stop the processor for a second, and is answered after
+    /// Check that a brown-out reset guards the supply; where it is off, set it if `set` asks for
+    /// it. Only while torque is off: it may stop the processor for a second, and is answered after
     /// that. What was set counts after the next reset.
     GuardSupply {
         /// True to set it.

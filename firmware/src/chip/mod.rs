@@ -28,7 +28,7 @@ pub(crate) use pin::{Pin, Placed};
 pub(crate) use start::{Begun, Own, Parts, Statics, Wired, own};
 pub(crate) use supply::Supply;
 
-/// What the tests of the board start by themselves.
+// A test of the board starts these by itself.
 #[allow(unused_imports, reason = "the tests of the board use them")]
 pub(crate) use {
     start::serial_number, supply::is_falling, tick_timer::TickTimer, usb::init as usb, watchdog::Watchdog,

@@ -1,7 +1,6 @@
-//! Start-up, in parts: the clocks, then the board's pins, the amplifier first ([`Parts`]); after that
-//! nothing runs by itself, and nothing has been written. The image starts all of it
-//! ([`Chip::start`]), the board's own test what it uses. Interrupts are masked meanwhile in the
-//! image.
+//! Start-up, in parts: the clocks, then the board's pins, the amplifier first ([`Parts`]). After
+//! that nothing runs by itself, and nothing has been written. The image starts all of it
+//! ([`Chip::start`]), the board's own test what it uses. The image masks interrupts meanwhile.
 
 use super::brownout;
 use super::clock::{self, Source};
@@ -94,7 +93,7 @@ pub(crate) struct Parts<W: Wiring> {
     pub(crate) chip: Chip,
 }
 
-/// What the microcontroller does by itself, once it is started.
+/// The peripherals that the microcontroller works with by itself, once they are started.
 pub(crate) struct Chip {
     pub(crate) flash: Sectors,
     pub(crate) usb: usb::Core,

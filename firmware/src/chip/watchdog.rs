@@ -18,8 +18,8 @@ impl Watchdog {
         let mut watchdog = IndependentWatchdog::new(timer);
         watchdog.stop_on_debug(&debug, true);
         watchdog.start(timing::WATCHDOG_MS.millis());
-        // Its time crosses into the domain of its slow clock, and counts from the next feed on; until
-        // then it waits for half a second (RM0090 21.3.2).
+        // Its time crosses into the domain of its slow clock, and counts from the next feed on;
+        // until then it waits for half a second (RM0090 21.4.4).
         // SAFETY: a read without a side effect.
         let status = unsafe { &*IWDG::ptr() }.sr();
         (0..timing::WATCHDOG_SETTLE_TURNS).any(|_| status.read().bits() == 0);

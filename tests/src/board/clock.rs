@@ -25,8 +25,8 @@ impl World {
         session.board_mut().part().rcc.attach_crystals(if fits { CLOCK_HZ } else { 0 }, 0);
     }
 
-    /// RM0090 3.5.1: a wait state for every 24 MHz on the 2.4 to 2.7 V at which the part still runs,
-    /// before the clock rises. The part's first revision does not prefetch (errata sheet).
+    /// RM0090 3.5.1: a wait state for every 24 MHz on the 2.4 to 2.7 V at which the part still
+    /// runs, before the clock rises. The part's first revision does not prefetch (errata sheet).
     pub(super) fn watch_wait_states(&mut self, session: &mut Session<Machine>, at: Nanos) {
         let mut register =
             |address| session.board_mut().mcu.peek(VirtualNanos(at), address, Width::W32).unwrap_or(0);

@@ -72,7 +72,7 @@ pub struct Array {
     pub options: u32,
     /// The number of times they were written.
     pub option_writes: u32,
-    /// What is wrong with them.
+    /// Their fault.
     pub option_fault: OptionFault,
     /// The flags of the status register that programming them has left.
     status: u32,

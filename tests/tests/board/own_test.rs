@@ -1,5 +1,5 @@
-//! The boards' own test (`firmware/tests/board.rs`), wired as it says and with its cable in a PC: the
-//! same program that `cargo xtask board-test` flashes, each of its tests after a reset.
+//! The boards' own test (`firmware/tests/board.rs`), wired as it says and with its cable in a PC:
+//! the same program that `cargo xtask board-test` flashes, each of its tests after a reset.
 
 use tests::board::log::Log;
 use tests::board::semihosting::{self, Host};
@@ -32,7 +32,7 @@ fn run(wiring: Wiring, address: u32) -> (Option<u32>, Vec<String>, usize, Board)
     (status, lines, resets, board)
 }
 
-/// Where the test step leaves it: next to the board's image.
+/// The path at which the test step leaves it: next to the board's image.
 fn own_test(wiring: Wiring) -> std::path::PathBuf {
     let image = image_for(&wiring.pins);
     let name = image.file_name().expect("a file").to_string_lossy();
@@ -54,7 +54,7 @@ fn address_of(wiring: Wiring, name: &str) -> u32 {
 
 /// Takes more than 5 s: eight programs from their start, four erasures and 80,000 ticks.
 #[test]
-fn every_test_of_it_passes_but_that_of_a_cache_which_is_not_there() {
+fn every_test_passes_but_that_of_a_cache_there_is_none_of() {
     for wiring in [Wiring::default(), Wiring::nucleo_f429zi()] {
         let wiring = Wiring { loopback: true, ..wiring };
         let tests = tests_of(wiring);

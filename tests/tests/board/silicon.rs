@@ -141,9 +141,9 @@ fn a_configuration_is_saved_on_a_low_supply() {
     is_allowed(&mut rig.board);
 }
 
-/// RM0090 3.5.1: 168 MHz take 5 wait states from 2.7 V on and 6 below, before the clock rises. ST's start-up code
-/// prefetches from revision 0x1001 on; the first revision reads as its number in the manual or, by
-/// the errata sheet, as an STM32F2.
+/// RM0090 3.5.1: 168 MHz take 5 wait states from 2.7 V on and 6 below, before the clock rises.
+/// ST's start-up code prefetches from revision 0x1001 on; the first revision reads as its number in
+/// the manual or, by the errata sheet, as an STM32F2.
 #[test]
 fn the_flash_has_time_on_the_lowest_supply() {
     const FLASH_ACR: u64 = 0x4002_3C00;

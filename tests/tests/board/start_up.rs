@@ -1,4 +1,4 @@
-//! What may go wrong before the first tick: a peripheral that hangs, and states that a reset leaves.
+//! Faults before the first tick: a peripheral that hangs, and states that a reset leaves.
 
 use link::frames::EventKind;
 use tests::board::{MILLISECOND, Wiring, plant};

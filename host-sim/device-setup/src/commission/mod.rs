@@ -222,8 +222,8 @@ pub async fn commission(
     })
 }
 
-/// Sees that a brown-out reset guards the supply, for no pulse is played without; one that is off is
-/// set if the person agrees.
+/// Sees that a brown-out reset guards the supply, for no pulse is played without; one that is off
+/// is set if the person agrees.
 async fn guard_supply(
     bench: &mut Bench<'_>,
     ask: &mut impl AsyncFnMut(CommissioningStep) -> Result<(), Error>,

@@ -17,8 +17,8 @@ const OPTSTRT: u32 = 1 << 1;
 pub(in super::super) const FLASH_SR: u64 = 0x4002_3C0C;
 const OPERR: u32 = 1 << 1;
 const BSY: u32 = 1 << 16;
-/// The read protection's byte and its value while there is none (3.7.3): any other is carried into
-/// flash for good or erases everything when it is taken back.
+/// The read protection's byte and its value while there is none (3.7.3): any other stays in
+/// flash, or erases everything when it is taken back.
 const RDP: u32 = 0xFF << 8;
 const RDP_NONE: u32 = 0xAA << 8;
 /// Time in which option bytes are programmed: that of the shortest sector, 16 bits at a time (data
