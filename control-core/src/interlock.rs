@@ -75,7 +75,7 @@ impl fmt::Display for Interlock {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Supply => {
-                "the supply is too low, or no brown-out reset guards it; check the board's power, then switch it off and on"
+                "the supply is too low, or no brown-out reset guards it; check the board's power, then run host-sim commission"
             }
             Self::EmergencyStop => "the emergency stop is open; release it, or fit its jumper if there is none",
             Self::AmplifierNotReady => {

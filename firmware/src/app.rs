@@ -47,32 +47,35 @@ mod app {
     ])]
     fn init(context: init::Context) -> (Shared, Local) {
         let ends = context.local.queues.split();
-        let parts = Wires::init(context.core, context.device, context.local.statics);
+        let parts = Wires::init(context.core, context.device);
+        let started = parts.chip.start::<Wires>(context.local.statics);
+        let wired = parts.wired;
+        let (encoder, encoder_lines) = wired.encoder;
         let local = Local {
             tick: context.local.tick_place.write(Tick::new(
                 &SHARED,
-                (parts.tick_timer, parts.encoder, parts.drive),
-                &parts.plan,
-                parts.heat,
+                (started.tick_timer, encoder, wired.drive),
+                &started.plan,
+                started.heat,
                 ends.tick,
             )),
             supply: parts.supply,
             supervisor: Watch::new(
                 &SHARED,
-                parts.watchdog,
+                started.watchdog,
                 parts.supply_level,
-                parts.encoder_lines,
-                parts.drive_lines,
+                encoder_lines,
+                wired.drive_lines,
             ),
-            usb: Port::new(&SHARED, parts.serial, ends.usb),
+            usb: Port::new(&SHARED, started.serial, ends.usb),
             telemetry: context.local.telemetry_place.write(Telemetry::new(
                 &SHARED,
-                (parts.identity, &parts.plan, parts.reset_cause, parts.crash, parts.heat.is_some()),
-                parts.store,
+                (started.identity, &started.plan, started.reset_cause, started.crash, started.heat.is_some()),
+                started.store,
                 ends.telemetry,
-                parts.lamps,
+                wired.lamps,
             )),
-            tilt: Tilt::new(&SHARED, parts.tilt),
+            tilt: Tilt::new(&SHARED, wired.tilt),
         };
         (Shared {}, local)
     }

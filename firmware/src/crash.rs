@@ -1,12 +1,13 @@
 //! Panic, hard fault, stray interrupt: the amplifier goes off, then the converters to zero torque,
-//! by direct register writes that need nothing to be in order, not even the stack. Then word is
-//! left for the next start, and the device resets itself, so that a PC finds a device that answers
-//! and says what happened. It names no pin: those are the board's.
+//! by direct register writes that need nothing to be in order, not even the stack. What comes then
+//! is the program's (`give_up`): the image leaves word for the next start and resets itself, so
+//! that a PC finds a device that answers and says what happened. It names no pin: those are the
+//! board's.
 #![allow(unsafe_code, reason = "after a fault nothing that owns a register can be trusted")]
 
 use crate::board::Wires;
 use crate::chip::{self, Wiring};
-use crate::last_words::LAST_WORDS;
+use crate::give_up;
 use core::panic::PanicInfo;
 use cortex_m::peripheral::SCB;
 use cortex_m_rt::exception;
@@ -26,17 +27,17 @@ fn safe_state() {
 
 fn end(crash: &Crash) -> ! {
     safe_state();
-    LAST_WORDS.crash(crash);
-    SCB::sys_reset()
+    give_up(crash, None)
 }
 
 #[panic_handler]
 fn panic(info: &PanicInfo<'_>) -> ! {
     // The motor before anything else.
     safe_state();
-    end(&info
-        .location()
-        .map_or(Crash::new(CrashKind::Panic, 0), |place| Crash::panic(place.file(), place.line())))
+    let place = info.location();
+    let crash =
+        place.map_or(Crash::new(CrashKind::Panic, 0), |place| Crash::panic(place.file(), place.line()));
+    give_up(&crash, Some(info))
 }
 
 /// The clock from outside has stopped while the clock security (RM0090 7.2.7) watched it; the core

@@ -26,6 +26,13 @@ mod last_words;
 static SHARED: firmware::tasks::shared::Shared =
     firmware::tasks::shared::Shared::new(&last_words::LAST_WORDS);
 
+/// The end of a crash, with the motor safe: word for the next start, and a reset.
+#[cfg(target_os = "none")]
+fn give_up(crash: &firmware::reset::Crash, _: Option<&core::panic::PanicInfo<'_>>) -> ! {
+    last_words::LAST_WORDS.crash(crash);
+    cortex_m::peripheral::SCB::sys_reset()
+}
+
 // Before each line of the log: milliseconds since the tasks were started. They wrap after 49 days,
 // and are 0 in start-up.
 #[cfg(target_os = "none")]

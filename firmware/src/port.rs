@@ -9,6 +9,7 @@ use crate::tilt::TiltSource;
 use crate::wire_check::PulledLines;
 use control_core::units::Counts;
 use embedded_hal::digital::OutputPin;
+use link::frames::GuardRefusal;
 
 /// A board: its parts, and what reaches its processor as a whole.
 pub trait Board: 'static {
@@ -47,6 +48,9 @@ pub trait Board: 'static {
     fn wake_tilt();
     /// True if the port's own interrupt may set the USB task off.
     fn allow_usb(allowed: bool);
+    /// Checks that a brown-out reset guards the supply; where it is off, sets it if `set` asks for
+    /// it, which stops the processor for up to a second and counts after the next reset.
+    fn guard_supply(set: bool) -> Result<(), GuardRefusal>;
 }
 
 /// The timer whose edges are the ticks.
@@ -88,8 +92,8 @@ pub trait Watchdog {
 
 /// The lamps by which a person sees the device's state without a PC.
 pub trait Lamps {
-    /// Lights the one for torque, and the one for a fault that has latched or has ended the last
-    /// run.
+    /// Lights the one that says that the tasks run, the one for torque, and the one for a fault
+    /// that has latched or has ended the last run.
     fn show(&mut self, powered: bool, fault: bool);
 }
 

@@ -6,6 +6,15 @@ use control_core::TICK_HZ;
 /// The frequency of the board's external clock: a crystal, or the clock of its debugger.
 pub const EXTERNAL_CLOCK_HZ: u32 = 8_000_000;
 
+/// The frequency of the part's own oscillator, on which it comes out of reset (RM0090 7.2.2).
+pub const RESET_CLOCK_HZ: u32 = 16_000_000;
+
+/// The frequency at the PLL's input, at which it jitters least (RM0090 7.3.2).
+pub const PLL_INPUT_HZ: u32 = 2_000_000;
+
+/// The clock of the USB core.
+pub const USB_HZ: u32 = 48_000_000;
+
 /// The most that an STM32F407 runs at, and an STM32F429 without over-drive; the cycle counter
 /// counts it.
 pub const CORE_HZ: u32 = 168_000_000;
@@ -99,6 +108,9 @@ pub(crate) const TILT_FROZEN_MEASUREMENTS: u32 = 50;
 /// less.
 pub const TILT_SPI_HZ: u32 = 1_500_000;
 
+/// The rate to ask the HAL for to get it: it takes the second bus to run as out of reset.
+pub const TILT_SPI_ASKED_HZ: u32 = (TILT_SPI_HZ as u64 * RESET_CLOCK_HZ as u64 / APB2_HZ as u64) as u32;
+
 /// After this time in a turn telemetry takes no further packet: 0.3 ms. The command under way may end
 /// 2 ms later.
 pub(crate) const COMMAND_CYCLES: u32 = CORE_HZ / 3_300;
@@ -114,6 +126,10 @@ pub const FLASH_WORD_TURNS: u32 = 100_000;
 /// Longest time in which it erases a sector of 128 KiB, 16 bits at a time (data sheet: 2.6 s), in
 /// the same turns.
 pub const FLASH_ERASE_TURNS: u32 = 400_000_000;
+
+/// Longest time in which option bytes are programmed, that of the shortest sector (data sheet: 0.8
+/// s), in turns of at least six cycles: 1.1 s, well before the watchdog of an erasure.
+pub const OPTION_TURNS: u32 = 30_000_000;
 
 /// Priorities of the tasks, 1 the lowest. The tick is above everything; the supervisor is above
 /// whatever it has to watch. No critical section of RTIC masks the tick. PRIMASK does: the USB core

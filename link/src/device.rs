@@ -3,6 +3,7 @@
 //! oldest block first, and counted.
 
 mod commands;
+mod guard;
 mod upload;
 mod waiting;
 
@@ -20,6 +21,7 @@ use control_core::event::{Fault, Limits};
 use control_core::interlock::Interlocks;
 use control_core::{AnyOrder, Order, Plan, TICK_HZ, TickOutput};
 use core::borrow::BorrowMut;
+use guard::Guard;
 use heapless::HistoryBuf;
 pub use upload::LATE_TICKS;
 use upload::Upload;
@@ -87,6 +89,7 @@ pub struct Endpoint<W = Waiting> {
     interlocks: Interlocks,
     /// The optional sensors that are there, where somebody looks.
     fitted: Option<Sensors>,
+    guard: Guard,
     limits: Limits,
     fault: Option<Fault>,
     crash: Option<Crash>,
@@ -131,6 +134,7 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
             proof: Proof::None,
             interlocks: Interlocks::default(),
             fitted: None,
+            guard: Guard::default(),
             limits: Limits::default(),
             fault: reset_cause,
             crash: None,

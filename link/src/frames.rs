@@ -3,6 +3,7 @@
 
 use crate::build::Build;
 use crate::crash::Crash;
+pub use crate::guard::GuardRefusal;
 use crate::record::Record;
 use control_core::compensation::Gains;
 use control_core::config::{DacWidth, Device, Patient};
@@ -283,6 +284,8 @@ pub enum CommandRefusal {
     NotStopped,
     /// A stop with a later number has overtaken it: it gives no torque any more.
     Overtaken,
+    /// No brown-out reset guards the supply yet.
+    Guard(GuardRefusal),
 }
 
 impl core::fmt::Display for CommandRefusal {
@@ -310,6 +313,7 @@ impl core::fmt::Display for CommandRefusal {
             }
             CommandRefusal::NotStopped => f.write_str("a fault is cleared only after a stop; stop the device first"),
             CommandRefusal::Overtaken => f.write_str("a stop came after this start was asked for; start again"),
+            CommandRefusal::Guard(refusal) => refusal.fmt(f),
         }
     }
 }
@@ -389,4 +393,11 @@ pub enum Command {
     },
     /// A person has seen the fault that is latched; only after a stop that came after the fault.
     Clear,
+    /// Check that a brown-out reset guards the supply; where it is off, set it if `set` asks for
+    /// it. Only while torque is off: it may stop the processor for a second, and is answered after
+    /// that. What was set counts after the next reset.
+    GuardSupply {
+        /// True to set it.
+        set: bool,
+    },
 }

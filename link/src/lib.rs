@@ -18,6 +18,7 @@ pub mod commissioning;
 pub mod crash;
 pub mod device;
 pub mod frames;
+mod guard;
 pub mod host;
 mod record;
 

@@ -10,7 +10,7 @@ use fixed::types::I16F16;
 use link::codec::MAX_FRAME;
 use link::commissioning::Record;
 use link::device::{Endpoint, Identity};
-use link::frames::{Command, CommandRefusal, DeviceFrame, PROTOCOL_VERSION};
+use link::frames::{Command, CommandRefusal, DeviceFrame, GuardRefusal, PROTOCOL_VERSION};
 use link::host::{Commands, Reception};
 
 const IDENTITY: Identity =
@@ -207,4 +207,36 @@ fn no_command_passes_the_boards_ceilings() {
             );
         }
     }
+}
+
+/// A virtual device has no supply; a board answers when it has looked, and a command that is
+/// repeated meanwhile is carried out once.
+#[test]
+fn a_board_answers_for_its_supply_later() {
+    let mut bench = Bench::new(&Device::default(), (1.0, 1.0));
+    assert_eq!(bench.ask(Command::GuardSupply { set: true }), Ok(()));
+    let mut endpoint = bench.endpoint.guarding_supply();
+    let mut out = [0; MAX_FRAME];
+    let (id, length) = bench.commands.encode(Command::GuardSupply { set: true }, &mut out).expect("it fits");
+    let command = out[..length].to_vec();
+    let mut answers = |endpoint: &mut Endpoint| {
+        let mut found = Vec::new();
+        while let length @ 1.. = endpoint.transmit(&mut out) {
+            let frames = out[..length].iter().filter_map(|&byte| bench.reception.push(byte));
+            found.extend(frames.filter_map(|frame| match frame {
+                DeviceFrame::Ack(ack) if ack.id == id => Some(ack.result),
+                _ => None,
+            }));
+        }
+        found
+    };
+    for _ in 0..2 {
+        endpoint.receive(&command);
+        assert_eq!((endpoint.guard_asked(), answers(&mut endpoint).len()), (Some(true), 0));
+    }
+    let refused = Err(CommandRefusal::Guard(GuardRefusal::Restart));
+    endpoint.answer_guard(refused);
+    assert_eq!((endpoint.guard_asked(), answers(&mut endpoint)), (None, vec![refused]));
+    endpoint.receive(&command);
+    assert_eq!((endpoint.guard_asked(), answers(&mut endpoint)), (None, vec![refused]), "remembered");
 }

@@ -34,7 +34,35 @@ pub(crate) fn arguments(board: &Board) -> [&str; 9] {
 
 /// Builds the image; its path.
 pub(crate) fn build(board: &Board) -> Result<PathBuf, Error> {
-    let cargo = || shell::run(setup::cargo_for_board(setup::toolchain()?, "build").args(arguments(board)));
+    build_by(board, || {
+        shell::run(setup::cargo_for_board(setup::toolchain()?, "build").args(arguments(board)))
+    })
+}
+
+/// Builds the image, and the board's own test next to it, as `IMAGE-own-test`.
+pub(crate) fn build_with_own_test(board: &Board) -> Result<(), Error> {
+    let mut messages = String::new();
+    let image = build_by(board, || {
+        let mut cargo = setup::cargo_for_board(setup::toolchain()?, "build");
+        cargo.args(arguments(board)).args(["--bin", "firmware", "--test", "board"]);
+        messages = shell::output(cargo.args(["--message-format", "json-render-diagnostics"]))?;
+        Ok(())
+    })?;
+    // Cargo gives it a name with a hash, and says which.
+    let programs = messages.lines().filter_map(|line| line.split_once("\"executable\":\""));
+    let mut programs = programs.filter_map(|(_, rest)| rest.split('"').next());
+    let program = programs
+        .find(|path| Path::new(path).parent().is_some_and(|folder| folder.ends_with("deps")))
+        .ok_or_else(|| Error::new("cargo did not say where it left the board's own test"))?;
+    let name = image.file_name().unwrap_or_default().to_string_lossy();
+    let own_test = image.with_file_name(format!("{name}-own-test"));
+    fs::copy(program, &own_test)
+        .map(drop)
+        .map_err(|error| Error::new(format!("{program} cannot be copied to {}: {error}", own_test.display())))
+}
+
+/// Has `cargo` build the image; its path.
+fn build_by(board: &Board, cargo: impl FnOnce() -> Result<(), Error>) -> Result<PathBuf, Error> {
     let image = path(board);
     if board.is_default() {
         cargo()?;

@@ -167,9 +167,10 @@ fn same_bits() -> Result<(), Error> {
 }
 
 fn board() -> Result<(), Error> {
-    // The tests look for the other boards' images next to the default one's.
+    // The tests look for the other boards' images next to the default one's, and for each board's
+    // own test next to its image.
     for board in &boards::ALL {
-        firmware::build(board)?;
+        firmware::build_with_own_test(board)?;
     }
     if has_nextest() {
         shell::run(tests().args(["-E", "package(tests) and not (binary(page) or binary(board))"]))?;

@@ -7,6 +7,7 @@ use embedded_storage::nor_flash::{
 };
 use firmware::supervision::Task;
 use firmware::timing;
+use stm32f4xx_hal::pac::flash::RegisterBlock;
 use stm32f4xx_hal::pac::{FLASH, IWDG, RCC};
 
 /// Bytes of a sector.
@@ -56,12 +57,7 @@ impl Sectors {
         self.flash.sr().modify(|r, w| unsafe { w.bits(r.bits()) });
         start(&self.flash);
         let is_done = (0..turns).any(|_| self.flash.sr().read().bsy().bit_is_clear());
-        let sr = self.flash.sr().read();
-        let has_failed = sr.pgserr().bit()
-            || sr.pgperr().bit()
-            || sr.pgaerr().bit()
-            || sr.wrperr().bit()
-            || sr.operr().bit();
+        let has_failed = has_failed(&self.flash);
         self.flash.cr().write(|w| w.lock().set_bit());
         self.forget_cached();
         if is_done && !has_failed { Ok(()) } else { Err(NorFlashErrorKind::Other) }
@@ -71,21 +67,17 @@ impl Sectors {
     fn erase_sector(&mut self, sector: u8) -> Result<(), NorFlashErrorKind> {
         defmt::info!("erasing a sector of the configuration's flash");
         let sector = FIRST_SECTOR - self.below + sector;
-        watchdog(PATIENT);
-        let done = self.operate(timing::FLASH_ERASE_TURNS, |flash| {
-            // A register written whole begins from its reset value, which locks it (RM0090 3.9.7):
-            // whatever came after would be lost without a word. SAFETY: both numbers are sectors of
-            // this microcontroller, and no code is in them.
-            flash.cr().write(|w| unsafe {
-                w.lock().clear_bit().psize().psize16().ser().set_bit().snb().bits(sector)
-            });
-            flash.cr().modify(|_, w| w.lock().clear_bit().strt().set_bit());
-        });
-        watchdog(ALERT);
-        for task in Task::ALL {
-            SHARED.reports.alive(task);
-        }
-        done
+        patiently(|| {
+            self.operate(timing::FLASH_ERASE_TURNS, |flash| {
+                // A register written whole begins from its reset value, which locks it (RM0090
+                // 3.9.7): whatever came after would be lost without a word. SAFETY: both numbers
+                // are sectors of this microcontroller, and no code is in them.
+                flash.cr().write(|w| unsafe {
+                    w.lock().clear_bit().psize().psize16().ser().set_bit().snb().bits(sector)
+                });
+                flash.cr().modify(|_, w| w.lock().clear_bit().strt().set_bit());
+            })
+        })
     }
 
     /// Empties both caches, each of which has to be off for that (FLASH_ACR, RM0090 3.9.1): the
@@ -106,6 +98,23 @@ impl Sectors {
         self.flash.acr().modify(|_, w| w.dcrst().clear_bit());
         self.flash.acr().modify(|_, w| w.dcen().set_bit());
     }
+}
+
+/// True if the last operation has left an error flag.
+pub(super) fn has_failed(flash: &RegisterBlock) -> bool {
+    let sr = flash.sr().read();
+    sr.pgserr().bit() || sr.pgperr().bit() || sr.pgaerr().bit() || sr.wrperr().bit() || sr.operr().bit()
+}
+
+/// Does what stops the processor, for longer than the watchdog waits and any task may be silent.
+pub(super) fn patiently<T>(work: impl FnOnce() -> T) -> T {
+    watchdog(PATIENT);
+    let done = work();
+    watchdog(ALERT);
+    for task in Task::ALL {
+        SHARED.reports.alive(task);
+    }
+    done
 }
 
 /// A time of the independent watchdog: the code of its prescaler, the divider that it stands for,

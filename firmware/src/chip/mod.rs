@@ -30,6 +30,12 @@ pub(crate) use sleep::sleep;
 pub(crate) use start::{Begun, Own, Parts, Statics, Wired, own};
 pub(crate) use supply::Supply;
 
+// A test of the board starts these by itself.
+#[allow(unused_imports, reason = "the tests of the board use them")]
+pub(crate) use {
+    start::serial_number, supply::is_falling, tick_timer::TickTimer, usb::init as usb, watchdog::Watchdog,
+};
+
 use control_core::ceilings::Ceilings;
 use core::marker::PhantomData;
 use cortex_m::peripheral::DWT;
@@ -38,6 +44,7 @@ use firmware::drive::{ParallelDac, Two};
 use firmware::port::Board;
 use firmware::store::Nor;
 use firmware::tilt::TiltSource;
+use link::frames::GuardRefusal;
 use stm32f4xx_hal::pac::{Interrupt, Peripherals};
 
 /// The properties of a board with this microcontroller. The rest of [`Board`] is the
@@ -53,8 +60,8 @@ pub(crate) trait Wiring: 'static {
     /// The enable line past its owner.
     const ENABLE: Pin = <Self::Enable as Placed>::PIN;
 
-    /// Sets everything up, the amplifier first, on interrupts that are masked.
-    fn init(core: cortex_m::Peripherals, device: Peripherals, statics: &'static mut Statics) -> Parts<Self>
+    /// Sets every pin up, the amplifier first; nothing is started and nothing written.
+    fn init(core: cortex_m::Peripherals, device: Peripherals) -> Parts<Self>
     where
         Self: Sized;
 }
@@ -94,6 +101,13 @@ impl<W: Wiring> Board for Stm32F4<W> {
 
     fn allow_usb(allowed: bool) {
         usb::allow_interrupt(allowed);
+    }
+
+    fn guard_supply(set: bool) -> Result<(), GuardRefusal> {
+        if supply::is_falling() {
+            return Err(GuardRefusal::SupplyLow);
+        }
+        brownout::guard(set)
     }
 }
 

@@ -8,7 +8,7 @@ use firmware::monitor::Readings;
 use firmware::port::ReadDrive;
 use stm32f4xx_hal::gpio::{self, AnyPin, Input};
 use stm32f4xx_hal::hal_02::adc::Channel;
-use stm32f4xx_hal::pac::{ADC_COMMON, ADC2};
+use stm32f4xx_hal::pac::{ADC_COMMON, ADC1, ADC2};
 use stm32f4xx_hal::rcc::{Enable, Rcc};
 
 /// A line that a contact outside connects to the board's supply, pulled down: a wire that is off or
@@ -67,6 +67,9 @@ fn convert_for_ever<C: Channel<ADC2, ID = u8>>(converter: ADC2, _channel: C, rcc
     const SAMPLING: u8 = 0b100;
     let channel = C::channel();
     ADC2::enable(rcc);
+    // The manual does not say on whose clock the common registers are: on that of the first one, by
+    // its address.
+    ADC1::enable(rcc);
     // SAFETY: the prescaler that the HAL sets too; both converters run on it. 84 MHz by 4, for more
     // than 36 MHz is too fast (data sheet, ADC characteristics).
     unsafe { &*ADC_COMMON::ptr() }.ccr().modify(|_, w| w.adcpre().div4());

@@ -1,6 +1,6 @@
-//! Start-up, in two halves with the board's between them: the clocks, then the board's pins, the
-//! amplifier first, then all that the microcontroller does by itself. Interrupts are masked
-//! meanwhile.
+//! Start-up, in parts: the clocks, then the board's pins, the amplifier first ([`Parts`]). After
+//! that nothing runs by itself, and nothing has been written. The image starts all of it
+//! ([`Chip::start`]), the board's own test what it uses. The image masks interrupts meanwhile.
 
 use super::brownout;
 use super::clock::{self, Source};
@@ -16,6 +16,7 @@ use crate::last_words::LAST_WORDS;
 use control_core::ceilings::Ceilings;
 use control_core::event::Fault;
 use control_core::{Device, Patient, Plan};
+use cortex_m::peripheral::SYST;
 use firmware::drive::Converters;
 use firmware::port::Board;
 use firmware::reset::{Crash, ResetFlags, Said, cause};
@@ -25,24 +26,14 @@ use firmware::timing;
 use link::build::Build;
 use link::device::Identity;
 use stm32f4xx_hal::gpio::{PA11, PA12};
-use stm32f4xx_hal::otg_fs::USB;
 use stm32f4xx_hal::pac;
 use stm32f4xx_hal::rcc::Rcc;
 use stm32f4xx_hal::signature::Uid;
 
 /// Memory that must outlive start-up.
-pub(crate) struct Statics {
-    usb: usb::Statics,
-}
+pub(crate) type Statics = usb::Statics;
 
-impl Statics {
-    /// Empty.
-    pub(crate) const fn new() -> Self {
-        Self { usb: usb::Statics::new() }
-    }
-}
-
-/// The first half is done: the clocks run.
+/// The first part is done: the clocks run.
 pub(crate) struct Begun {
     /// For what the board switches on.
     pub(crate) rcc: Rcc,
@@ -95,19 +86,30 @@ pub(crate) struct Wired<W: Wiring> {
     pub(crate) lamps: Lamps,
 }
 
-/// The parts that the tasks get.
+/// The parts of a board on which nothing runs yet but its clocks.
 pub(crate) struct Parts<W: Wiring> {
-    pub(crate) tick_timer: TickTimer,
-    pub(crate) encoder: Encoder,
-    pub(crate) encoder_lines: EncoderLines,
-    pub(crate) drive_lines: DriveLines,
-    pub(crate) drive: BoardDrive<Stm32F4<W>>,
-    pub(crate) tilt: W::Tilt,
-    pub(crate) lamps: Lamps,
-    pub(crate) serial: usb::Port,
-    pub(crate) watchdog: Watchdog,
+    pub(crate) wired: Wired<W>,
     pub(crate) supply: Supply,
     pub(crate) supply_level: SupplyLevel,
+    pub(crate) chip: Chip,
+}
+
+/// The peripherals that the microcontroller works with by itself, once they are started.
+pub(crate) struct Chip {
+    pub(crate) flash: Sectors,
+    pub(crate) usb: usb::Core,
+    pub(crate) tick_timer: pac::TIM4,
+    pub(crate) watchdog: (pac::IWDG, pac::DBGMCU),
+    pub(crate) rcc: Rcc,
+    systick: SYST,
+    flags: ResetFlags,
+}
+
+/// The parts that run from now on.
+pub(crate) struct Started {
+    pub(crate) tick_timer: TickTimer,
+    pub(crate) serial: usb::Port,
+    pub(crate) watchdog: Watchdog,
     pub(crate) store: Store<Nor<Sectors>>,
     pub(crate) plan: Plan,
     pub(crate) heat: Option<u32>,
@@ -117,57 +119,56 @@ pub(crate) struct Parts<W: Wiring> {
 }
 
 impl<W: Wiring> Parts<W> {
-    /// The second half: starts the clocks of the tick, the supervisor and the watchdog.
-    pub(crate) fn start(
-        begun: Begun,
-        mut core: cortex_m::Peripherals,
-        own: Own,
-        wired: Wired<W>,
-        statics: &'static mut Statics,
-    ) -> Self {
+    /// After the board's pins: the cycle counter and the supply's detector.
+    pub(crate) fn new(begun: Begun, mut core: cortex_m::Peripherals, own: Own, wired: Wired<W>) -> Self {
         let Begun { mut rcc, flags } = begun;
         core.DCB.enable_trace();
         core.DWT.enable_cycle_counter();
         // Keeps the core's clock up in sleep: a debugger can read the log then, and the cycle
         // counter counts on. What it costs: `sleep`.
         own.debug.cr().modify(|_, w| w.dbg_sleep().set_bit());
-
-        let Said { crash, torque, heat } = LAST_WORDS.take();
+        brownout::note_loaded(&own.flash);
         let (supply, supply_level) = supply::warning(own.power, own.external, &mut rcc);
-        if !supply_level.is_falling() {
-            brownout::set(&own.flash);
-        }
-        let (store, device_part, patient_part) = Store::open(Nor(Sectors::new(own.flash)));
+        let chip = Chip {
+            flash: Sectors::new(own.flash),
+            usb: usb::Core::new(own.usb, own.usb_pins, &rcc),
+            tick_timer: own.tick_timer,
+            watchdog: (own.watchdog, own.debug),
+            rcc,
+            systick: core.SYST,
+            flags,
+        };
+        Self { wired, supply, supply_level, chip }
+    }
+}
+
+impl Chip {
+    /// Reads the configuration, which may erase a slot; then the watchdog before whatever could
+    /// hang, USB, and the clocks of the supervisor and of the tick.
+    pub(crate) fn start<W: Wiring>(mut self, statics: &'static mut Statics) -> Started {
+        let Said { crash, torque, heat } = LAST_WORDS.take();
+        let (store, device_part, patient_part) = Store::open(Nor(self.flash));
         let ceilings = W::CEILINGS.with_converters(<Stm32F4<W> as Board>::Converters::WIDTHS);
         let (plan, damage) = plan(&ceilings, device_part, patient_part);
-        let reset_cause = cause(flags, crash.as_ref(), torque).or(damage);
+        let reset_cause = cause(self.flags, crash.as_ref(), torque).or(damage);
         match &crash {
             Some(crash) => say(crash),
             None => defmt::info!("started; torque is off"),
         }
 
-        let bus = USB::new(own.usb, own.usb_pins, &rcc.clocks);
-        let serial = usb::init(bus, serial_number(), &mut statics.usb);
-        let mut systick = core.SYST;
+        let (timer, debug) = self.watchdog;
+        let watchdog = Watchdog::start(timer, debug);
+        let serial = usb::init(self.usb, serial_number(), statics);
+        let mut systick = self.systick;
         systick.set_clock_source(cortex_m::peripheral::syst::SystClkSource::Core);
         systick.set_reload(timing::CORE_HZ / timing::SUPERVISOR_HZ - 1);
         systick.clear_current();
         systick.enable_counter();
         systick.enable_interrupt();
-        let watchdog = Watchdog::start(own.watchdog, own.debug);
-        let (encoder, encoder_lines) = wired.encoder;
-        Self {
-            tick_timer: TickTimer::start(own.tick_timer, &mut rcc),
-            encoder,
-            encoder_lines,
-            drive_lines: wired.drive_lines,
-            drive: wired.drive,
-            tilt: wired.tilt,
-            lamps: wired.lamps,
+        Started {
+            tick_timer: TickTimer::start(self.tick_timer, &mut self.rcc),
             serial,
             watchdog,
-            supply,
-            supply_level,
             store,
             plan,
             heat,
@@ -232,7 +233,7 @@ fn version() -> [u8; 3] {
 }
 
 /// The microcontroller's unique number.
-fn serial_number() -> [u8; 12] {
+pub(crate) fn serial_number() -> [u8; 12] {
     let uid = Uid::get();
     let mut serial = [0; 12];
     serial[0..2].copy_from_slice(&uid.x().to_le_bytes());

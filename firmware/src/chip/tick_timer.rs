@@ -12,7 +12,7 @@ pub(crate) struct TickTimer(TIM4);
 
 impl TickTimer {
     /// Runs from now on.
-    pub(super) fn start(timer: TIM4, rcc: &mut Rcc) -> Self {
+    pub(crate) fn start(timer: TIM4, rcc: &mut Rcc) -> Self {
         TIM4::enable(rcc);
         TIM4::reset(rcc);
         timer.psc().write(|w| w.psc().set(0));

@@ -1,17 +1,57 @@
 //! The USB port of the board: a serial port (CDC ACM) on the full-speed core.
-#![allow(unsafe_code, reason = "an interrupt is unmasked")]
+#![allow(unsafe_code, reason = "an interrupt is unmasked, and the driver is given its core")]
 
 use core::fmt::Write;
 use firmware::port::{SerialPort, WouldBlock};
+use firmware::timing;
 use heapless::String;
+use stm32f4xx_hal::gpio::{PA11, PA12};
 use stm32f4xx_hal::otg_fs::{USB, UsbBus};
-use stm32f4xx_hal::pac::{Interrupt, NVIC};
+use stm32f4xx_hal::pac::{Interrupt, NVIC, OTG_FS_DEVICE, OTG_FS_GLOBAL, OTG_FS_PWRCLK};
+use stm32f4xx_hal::rcc::Rcc;
+use synopsys_usb_otg::UsbPeripheral;
 use usb_device::bus::UsbBusAllocator;
 use usb_device::device::{StringDescriptors, UsbDevice, UsbDeviceBuilder, UsbDeviceState, UsbVidPid};
 use usbd_serial::{CdcAcmClass, USB_CLASS_CDC};
 
 /// The bus of this board.
-type Bus = UsbBus<USB>;
+type Bus = UsbBus<Core>;
+
+/// The HAL's core, whose transceiver has power before the driver resets it: the reset ends some of
+/// the transceiver's clocks later (RM0090 34.16.2, `CSRST` and `PWRDWN`).
+pub(crate) struct Core {
+    /// Nobody else has its peripherals.
+    _owned: USB,
+}
+
+impl Core {
+    /// On the pins that it has on every board.
+    pub(super) fn new(
+        core: (OTG_FS_GLOBAL, OTG_FS_DEVICE, OTG_FS_PWRCLK),
+        pins: (PA11, PA12),
+        rcc: &Rcc,
+    ) -> Self {
+        Self { _owned: USB::new(core, pins, &rcc.clocks) }
+    }
+}
+
+// SAFETY: the HAL's own constants, and its core is switched on as it does.
+unsafe impl UsbPeripheral for Core {
+    const REGISTERS: *const () = USB::REGISTERS;
+    const HIGH_SPEED: bool = USB::HIGH_SPEED;
+    const FIFO_DEPTH_WORDS: usize = USB::FIFO_DEPTH_WORDS;
+    const ENDPOINT_COUNT: usize = USB::ENDPOINT_COUNT;
+
+    fn enable() {
+        USB::enable();
+        // SAFETY: the driver has the core, and calls this before anything else.
+        unsafe { &*OTG_FS_GLOBAL::ptr() }.gccfg().modify(|_, w| w.pwrdwn().set_bit());
+    }
+
+    fn ahb_frequency_hz(&self) -> u32 {
+        timing::CORE_HZ
+    }
+}
 
 /// The test identity of pid.codes. Its rule: anybody's, for tests in their own house, and never on
 /// a device that is handed on, sold or manufactured. Who does that asks pid.codes for a product
@@ -48,8 +88,9 @@ impl Statics {
     }
 }
 
-/// Connects to the bus as a serial port whose name ends in `serial`.
-pub(crate) fn init(core: USB, serial: [u8; 12], statics: &'static mut Statics) -> Port {
+/// Connects to the bus as a serial port whose name ends in `serial`. Its driver waits for the core
+/// without a bound.
+pub(crate) fn init(core: Core, serial: [u8; 12], statics: &'static mut Statics) -> Port {
     for byte in serial {
         // Two characters a byte: as many as there is room for.
         let _ = write!(statics.serial, "{byte:02X}");

@@ -427,12 +427,12 @@ fn a_device_saved_before_sensors_were_known_is_read_and_moved() {
     assert_eq!(load(&mut flash), found);
     // It moves to the other slot as it is.
     for top in 1..2 * CELLS as i16 {
-        assert_eq!(Store::open(&mut flash).0.save_patient(&patient(top)), Ok(()));
+        assert_eq!(Store::open(&mut flash).0.save_patient(&patient(top), || true), Ok(()));
         assert_eq!(load(&mut flash), found);
     }
     let sensors = Sensors { encoder_supply: true, current: false };
     let known = Device { sensors, ..Device::commissioned_virtual() };
-    assert_eq!(Store::open(&mut flash).0.save_device(&known), Ok(()));
+    assert_eq!(Store::open(&mut flash).0.save_device(&known, || true), Ok(()));
     assert_eq!(load(&mut flash), Stored::Found(known));
 }
 

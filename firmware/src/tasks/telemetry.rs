@@ -15,7 +15,7 @@ use control_core::{AnyOrder, LargeOrder, Plan};
 use core::sync::atomic::Ordering::{Acquire, Relaxed};
 use link::codec::MAX_FRAME;
 use link::device::{Ahead, Endpoint, Identity, Waiting};
-use link::frames::{SaveError, Stage, Timing};
+use link::frames::{CommandRefusal, SaveError, Stage, Timing};
 
 /// Packets that the longest frame may need: only with room for all of them is a frame begun.
 const FRAME_PACKETS: usize = MAX_FRAME / super::queues::PACKET_BYTES + 1;
@@ -69,7 +69,7 @@ impl<B: Board> Telemetry<B> {
         (ends, waiting): (TelemetryEnds, &'static mut Waiting),
         lamps: B::Lamps,
     ) -> Self {
-        let mut endpoint = Endpoint::with(waiting, identity, plan, reset_cause);
+        let mut endpoint = Endpoint::with(waiting, identity, plan, reset_cause).guarding_supply();
         endpoint.set_crash(crash);
         endpoint.set_knows_heat(knows_heat);
         Self {
@@ -152,6 +152,7 @@ impl<B: Board> Telemetry<B> {
         }
         B::allow_usb(true);
         self.forward_orders();
+        self.guard_supply();
         let in_session = self.endpoint.in_session();
         if in_session && !self.in_session {
             self.shared.stages.forget_longest();
@@ -166,6 +167,21 @@ impl<B: Board> Telemetry<B> {
     fn stop(&mut self) {
         self.shared.stop();
         self.held.take_if(|order| order.gives_torque());
+    }
+
+    /// Has the board check its brown-out reset, or set it, where the PC asks for it: not before the
+    /// amplifier is off, as in [`Self::save`].
+    fn guard_supply(&mut self) {
+        let Some(set) = self.endpoint.guard_asked() else { return };
+        self.shared.conditions.set(Interlock::Saving, true);
+        let is_off = !self.shared.is_powered();
+        let result = if is_off {
+            B::guard_supply(set).map_err(CommandRefusal::Guard)
+        } else {
+            Err(CommandRefusal::Powered)
+        };
+        self.shared.conditions.set(Interlock::Saving, false);
+        self.endpoint.answer_guard(result);
     }
 
     /// Passes orders on until there are no more or the tick has no room.

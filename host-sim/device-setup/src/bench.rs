@@ -10,7 +10,7 @@ use device_sim::driver::Driver;
 use device_sim::error::Error;
 use link::commissioning::Record;
 use link::crash::Crash;
-use link::frames::{DeviceFrame, EventKind};
+use link::frames::{DeviceFrame, EventKind, GuardRefusal};
 use std::time::Duration;
 
 /// A device that is there answers within this.
@@ -91,6 +91,24 @@ impl<'a> Bench<'a> {
             bench.driver.is_ready(bench.now)
         })
         .await
+    }
+
+    /// Has the device check that a brown-out reset guards its supply, and set one that is off if
+    /// `set` is true.
+    pub(crate) async fn guard_supply(&mut self, set: bool) -> Result<Result<(), GuardRefusal>, Error> {
+        const SILENT: &str =
+            "the device did not answer whether its supply is guarded; flash this program's firmware";
+        self.driver.guard_supply(set);
+        let end = self.now + TO_ANSWER;
+        loop {
+            self.exchange().await?;
+            match (self.driver.take_guard(), self.driver.notice()) {
+                (Some(answer), _) => return Ok(answer),
+                (None, Some(why)) => return Err(Error::failed(why)),
+                (None, None) if self.now > end => return Err(Error::failed(SILENT)),
+                (None, None) => {}
+            }
+        }
     }
 
     /// The device's part of the configuration.

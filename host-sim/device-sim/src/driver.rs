@@ -10,7 +10,7 @@ use control_core::event::Fault;
 use control_core::excitation::Excitation;
 use control_core::{Device, Patient};
 use link::codec::{self, MAX_FRAME};
-use link::frames::{Ack, Command, CommandRefusal, DeviceFrame, EventKind, PROTOCOL_VERSION};
+use link::frames::{Ack, Command, CommandRefusal, DeviceFrame, EventKind, GuardRefusal, PROTOCOL_VERSION};
 use link::host::{Commands, Counts, Reception};
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -46,6 +46,8 @@ pub struct Driver {
     fault: Option<Fault>,
     /// The answer to the last request for another patient.
     changed: Option<Result<(), String>>,
+    /// The answer to the last question for the supply's guard.
+    guarded: Option<Result<(), GuardRefusal>>,
     out: Vec<u8>,
 }
 
@@ -82,6 +84,7 @@ impl Driver {
             refused: None,
             fault: None,
             changed: None,
+            guarded: None,
             out: Vec::new(),
         }
     }
@@ -172,6 +175,17 @@ impl Driver {
     /// Marks the device's configuration as found by commissioning.
     pub fn commission(&mut self) {
         self.waiting.push_back(Command::Commission);
+    }
+
+    /// Has the device check that a brown-out reset guards its supply, and set one that is off if
+    /// `set` is true. [`Self::take_guard`] returns the answer.
+    pub fn guard_supply(&mut self, set: bool) {
+        self.waiting.push_back(Command::GuardSupply { set });
+    }
+
+    /// Returns once the answer to [`Self::guard_supply`].
+    pub fn take_guard(&mut self) -> Option<Result<(), GuardRefusal>> {
+        self.guarded.take()
     }
 
     /// Has the device report its part of the configuration in force.
@@ -320,6 +334,8 @@ impl Driver {
                 self.changed = Some(Err(format!("the device refused: {why}")));
             }
             (Ok(()), Command::ConfigurePatient(_)) => self.ready = true,
+            (Ok(()), Command::GuardSupply { .. }) => self.guarded = Some(Ok(())),
+            (Err(CommandRefusal::Guard(why)), _) => self.guarded = Some(Err(why)),
             (Ok(()), Command::Start) => {
                 self.has_started = true;
                 self.notice = None;

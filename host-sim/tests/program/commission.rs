@@ -49,6 +49,8 @@ fn refused(wiring: Wiring, hints: &[&str]) {
 #[test]
 fn a_device_that_is_right_is_measured() {
     let rig = rig();
+    let (_, steps, _) = commission_on(&rig, Wiring::default(), (0.1, 1.0));
+    assert!(!steps.contains(&CommissioningStep::GuardSupply), "a virtual device has no supply: {steps:?}");
     let found = commissioned(Wiring::default());
     assert!(!found.channels_swapped && !found.leads_reversed);
     let device = &found.record.device;

@@ -7,7 +7,7 @@ use control_core::interlock::Interlock;
 use control_core::plan::Field;
 use diagnosis::Verdict;
 use fixed::types::I16F16;
-use link::frames::{CommandRefusal, SaveError};
+use link::frames::{CommandRefusal, GuardRefusal, SaveError};
 
 const GLOSSARY: &str = include_str!("../../../docs/glossary.md");
 
@@ -48,8 +48,16 @@ fn the_glossary_quotes_every_fault_and_refusal_exactly() {
         SequenceRefusal::Late,
     ]
     .map(CommandRefusal::Sequence);
+    let guard = [
+        GuardRefusal::Off,
+        GuardRefusal::Restart,
+        GuardRefusal::Implausible(0xCFFF_FFFD),
+        GuardRefusal::NotTaken,
+        GuardRefusal::SupplyLow,
+    ]
+    .map(CommandRefusal::Guard);
     let kept = [SaveError::Flash, SaveError::Full, SaveError::TooLong];
-    let sentences = own.iter().chain(&interlocked).chain(&sequence).map(ToString::to_string);
+    let sentences = own.iter().chain(&interlocked).chain(&sequence).chain(&guard).map(ToString::to_string);
     let sentences: Vec<String> = sentences.chain(kept.map(|error| error.to_string())).collect();
     let refusals = rows("Refusals of a command");
     // Two heads, and the two rows that point to the refusals.

@@ -21,6 +21,7 @@ fn needs_torque_off(command: &Command) -> bool {
                 | Command::Index(_)
                 | Command::Segment { .. }
                 | Command::Play { .. }
+                | Command::GuardSupply { .. }
         )
 }
 
@@ -62,6 +63,11 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
             let _ = self.waiting.borrow_mut().acks.push_back(*ack);
             return;
         }
+        if let Command::GuardSupply { set } = frame.command
+            && self.defer_guard(frame.id, set)
+        {
+            return;
+        }
         let result = self.carry_out(frame.id, frame.command);
         let ack = Ack { id: frame.id, result };
         if result != Err(CommandRefusal::Full) {
@@ -77,8 +83,7 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
     }
 
     fn carry_out(&mut self, id: u32, command: Command) -> Result<(), CommandRefusal> {
-        let has_torque = self.powered || self.start_ordered || self.ahead.is_on || self.ahead.start_waits;
-        if has_torque && needs_torque_off(&command) {
+        if self.has_torque() && needs_torque_off(&command) {
             return Err(CommandRefusal::Powered);
         }
         if makes_plan(&command) && self.waiting.borrow().orders.is_full() {
@@ -136,6 +141,8 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
             Command::Index(index) => self.order(LargeOrder::Index(index.map(Counts))),
             Command::Segment { index, excitation } => self.upload(index, excitation),
             Command::Play { count, checksum } => self.play(count, checksum),
+            // Nothing to guard: a board would have deferred it.
+            Command::GuardSupply { .. } => Ok(()),
         }
     }
 
@@ -183,6 +190,11 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
                 let _ = orders.push_back(order);
             }
         }
+    }
+
+    /// True if torque is on or on its way.
+    pub(super) fn has_torque(&self) -> bool {
+        self.powered || self.start_ordered || self.ahead.is_on || self.ahead.start_waits
     }
 
     /// Ids wrap.

@@ -5,7 +5,7 @@
 use rigless::emulator::{Access, AccessKind, Checked, CoreBus, InterruptLine, Queued};
 use rigless::time::VirtualNanos;
 
-use super::flash::{FLASH_OPTCR, Flash, WRITABLE};
+use super::flash::{FLASH_OPTCR, FLASH_SR, Flash, WRITABLE};
 use super::pins::{PartPin, register};
 
 /// One instruction a cycle at 168 MHz. The emulator has no cycles, so this makes an instruction
@@ -95,6 +95,9 @@ impl CoreBus for Rerouted<'_> {
         let value = self.bus.access(access, from_code)?;
         if let Some(identity) = self.identity.filter(|_| !written && address == DBGMCU_IDCODE) {
             return Some(identity.into());
+        }
+        if !written && address == FLASH_SR {
+            return Some(value | u64::from(self.flash.array().status()));
         }
         let high = self.shorted.filter(|place| !written && access.address == place.register(register::INPUT));
         Some(high.map_or(value, |place| value | 1 << place.index))

@@ -129,30 +129,44 @@ fn branch(place: u32, first: u16, second: u16) -> u32 {
     place.wrapping_add(4).wrapping_add_signed(signed)
 }
 
+/// The entries of the table of symbols: the name of each and the entry itself.
+fn entries(bytes: &[u8]) -> Option<Vec<(String, &[u8])>> {
+    const SYMBOL_TABLE: u32 = 2;
+    const ENTRY: usize = 16;
+    let sections = sections(bytes)?;
+    let table = sections.iter().find(|section| section[0] == SYMBOL_TABLE)?;
+    let names = sections.get(table[4] as usize)?[2] as usize;
+    let all = bytes.get(table[2] as usize..(table[2] + table[3]) as usize)?.chunks_exact(ENTRY);
+    let entries = all.filter_map(|entry| {
+        let name = bytes.get(names + word(entry, 0)? as usize..)?;
+        let name = name.split(|&byte| byte == 0).next()?;
+        Some((String::from_utf8_lossy(name).into_owned(), entry))
+    });
+    Some(entries.collect())
+}
+
 /// Every function and object of the file; none for a file that is no such ELF.
 #[must_use]
 pub fn symbols(bytes: &[u8]) -> Vec<Symbol> {
-    const SYMBOL_TABLE: u32 = 2;
-    const ENTRY: usize = 16;
-    let read = || {
-        let sections = sections(bytes)?;
-        let table = sections.iter().find(|section| section[0] == SYMBOL_TABLE)?;
-        let names = sections.get(table[4] as usize)?[2] as usize;
-        let entries = (0..table[3] as usize / ENTRY).map(|n| table[2] as usize + n * ENTRY);
-        let symbols = entries.filter_map(|at| {
-            let kind = bytes.get(at + 12)? & 0xF;
-            let name = bytes.get(names + word(bytes, at)? as usize..)?;
-            let name = name.split(|&byte| byte == 0).next()?;
-            let address = word(bytes, at + 4)?;
-            // Objects are 1, functions 2.
-            let address = if kind == 2 { address & !1 } else { address };
-            matches!(kind, 1 | 2).then(|| Symbol {
-                name: String::from_utf8_lossy(name).into_owned(),
-                address,
-                size: word(bytes, at + 8).unwrap_or(0),
-            })
-        });
-        Some(symbols.collect())
-    };
-    read().unwrap_or_default()
+    let symbols = entries(bytes).unwrap_or_default().into_iter().filter_map(|(name, entry)| {
+        let (kind, address) = (entry[12] & 0xF, word(entry, 4)?);
+        // Objects are 1, functions 2.
+        let address = if kind == 2 { address & !1 } else { address };
+        let size = word(entry, 8).unwrap_or(0);
+        matches!(kind, 1 | 2).then_some(Symbol { name, address, size })
+    });
+    symbols.collect()
+}
+
+/// Every object of the file with its bytes, in whatever section it is.
+#[must_use]
+pub fn objects(bytes: &[u8]) -> Vec<(String, Vec<u8>)> {
+    let sections = sections(bytes).unwrap_or_default();
+    let objects = entries(bytes).unwrap_or_default().into_iter().filter_map(|(name, entry)| {
+        let [_, begin, offset, ..] = *sections.get(usize::from(half(entry, 14)?))?;
+        let at = (offset + word(entry, 4)?.checked_sub(begin)?) as usize;
+        let content = bytes.get(at..at + word(entry, 8)? as usize)?;
+        (entry[12] & 0xF == 1).then(|| (name, content.to_vec()))
+    });
+    objects.collect()
 }

@@ -18,7 +18,7 @@ const DETECTOR: u32 = 1 << 16;
 pub(super) const INTERRUPTS: [u16; 1] = [1];
 
 /// The controller.
-#[derive(Debug, Default, Serialize, Deserialize)]
+#[derive(Debug, Serialize, Deserialize)]
 pub(super) struct Exti {
     mask: u32,
     rising: u32,
@@ -29,6 +29,21 @@ pub(super) struct Exti {
     /// The detector's new state that the controller has not seen yet.
     arriving: Option<bool>,
     line: bool,
+}
+
+impl Default for Exti {
+    /// Out of reset. What is pending then is undefined (12.3.6): the worst is that all is.
+    fn default() -> Self {
+        Self {
+            mask: 0,
+            rising: 0,
+            falling: 0,
+            pending: DETECTOR,
+            detector: false,
+            arriving: None,
+            line: false,
+        }
+    }
 }
 
 impl Exti {

@@ -8,26 +8,21 @@
 //! … causes the bus to stall"): for its whole time nothing runs, the watchdog excepted. The same
 //! holds for the time in which it takes a word. The interface's registers stay the emulator's; this model watches what is written to them.
 
+mod options;
+
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use rigless::snapshot::{Error, Reader, Store, Writer};
 use serde::{Deserialize, Serialize};
 
+use options::FLASH_OPTKEYR;
+pub use options::{FACTORY_OPTIONS, GUARDED_OPTIONS, OptionFault};
+pub(super) use options::{FLASH_OPTCR, FLASH_SR};
+
 /// The flash interface's control register, its bits, and its key register.
 const FLASH_CR: u64 = 0x4002_3C10;
 const FLASH_KEYR: u64 = 0x4002_3C04;
-/// The option bytes' control and key registers (RM0090 3.9.10, 3.9.4).
-pub(super) const FLASH_OPTCR: u64 = 0x4002_3C14;
-const FLASH_OPTKEYR: u64 = 0x4002_3C08;
-const OPTKEY1: u32 = 0x0819_2A3B;
-const OPTKEY2: u32 = 0x4C5D_6E7F;
-const OPTLOCK: u32 = 1;
-const OPTSTRT: u32 = 1 << 1;
-/// The option bytes as the factory leaves them: `BOR_LEV` is 0b11, which is off.
-pub const FACTORY_OPTIONS: u32 = 0x0FFF_AAEC;
-/// The same with brown-out level 2.
-pub const GUARDED_OPTIONS: u32 = FACTORY_OPTIONS & !(0b11 << 2) | 0b01 << 2;
 const PG: u32 = 1;
 const SER: u32 = 1 << 1;
 const STRT: u32 = 1 << 16;
@@ -57,6 +52,8 @@ const LARGE: u64 = 0x2_0000;
 pub(super) const SLOT_BYTES: u64 = LARGE;
 /// The sectors of the configuration: the last two of one megabyte.
 pub const CONFIGURATION: std::ops::Range<u64> = 0x080C_0000..0x0810_0000;
+/// The number of the first of them.
+pub const FIRST_OF_CONFIGURATION: u64 = 10;
 /// The sectors that a firmware may write: the configuration's and the two before them, which the
 /// board's own test uses.
 pub(super) const WRITABLE: std::ops::Range<u64> = 0x0808_0000..0x0810_0000;
@@ -78,6 +75,10 @@ pub struct Array {
     pub options: u32,
     /// The number of times they were written.
     pub option_writes: u32,
+    /// Their fault.
+    pub option_fault: OptionFault,
+    /// The flags of the status register that programming them has left.
+    status: u32,
     /// The part's supply in millivolts.
     pub(super) supply: u32,
     /// Sectors erased since the board was switched on, each with the instant in nanoseconds.
@@ -106,6 +107,8 @@ impl Default for Array {
             options_unlocked: false,
             options: GUARDED_OPTIONS,
             option_writes: 0,
+            option_fault: OptionFault::None,
+            status: 0,
             supply: 3_300,
             erased: Vec::new(),
             operations: 0,
@@ -162,7 +165,7 @@ impl Array {
     /// The core starts again, with the supply back.
     pub(super) fn restarted(&mut self) {
         (self.control, self.key, self.option_key) = (LOCK, 0, 0);
-        (self.option_control, self.options_unlocked) = (self.options, false);
+        (self.option_control, self.options_unlocked, self.status) = (self.options, false, 0);
         self.cut = false;
     }
 
@@ -199,22 +202,6 @@ impl Array {
         Some(bytes)
     }
 
-    /// Returns the option bytes' control register as it reads.
-    pub(super) fn option_register(&self) -> u32 {
-        self.option_control | if self.options_unlocked { 0 } else { OPTLOCK }
-    }
-
-    fn options_written(&mut self, value: u32) {
-        if !self.options_unlocked {
-            return;
-        }
-        self.option_control = value & !(OPTLOCK | OPTSTRT);
-        self.options_unlocked = value & OPTLOCK == 0;
-        if value & OPTSTRT != 0 {
-            (self.options, self.option_writes) = (self.option_control, self.option_writes + 1);
-        }
-    }
-
     /// A write of the firmware to a register, which may be the interface's, at the instant `at`.
     /// Returns the time for which the core then stalls, in nanoseconds.
     pub(super) fn register_written(&mut self, address: u64, value: u32, at: u64) -> u64 {
@@ -226,15 +213,7 @@ impl Array {
                 self.key = value;
                 0
             }
-            FLASH_OPTKEYR => {
-                self.options_unlocked |= value == OPTKEY2 && self.option_key == OPTKEY1;
-                self.option_key = value;
-                0
-            }
-            FLASH_OPTCR => {
-                self.options_written(value);
-                0
-            }
+            FLASH_OPTKEYR | FLASH_OPTCR | FLASH_SR => self.option_register_written(address, value),
             FLASH_CR if self.control & LOCK == 0 => {
                 self.control = value;
                 let starts = value & (LOCK | SER | STRT) == SER | STRT;
@@ -316,21 +295,6 @@ mod tests {
         array.register_written(FLASH_CR, PG | 0b01 << 8, 0);
         array.store(CELL + 2, 2, 0x1234);
         assert_eq!((array.word(CELL), array.violations.len()), (0x1234_FFFF, 2));
-    }
-
-    #[test]
-    fn option_bytes_want_both_keys_and_a_start() {
-        let mut array = Array { options: FACTORY_OPTIONS, ..Array::default() };
-        array.restarted();
-        array.register_written(FLASH_OPTCR, GUARDED_OPTIONS | OPTSTRT, 0);
-        assert_eq!((array.options, array.option_register() & OPTLOCK), (FACTORY_OPTIONS, OPTLOCK));
-        array.register_written(FLASH_OPTKEYR, OPTKEY1, 0);
-        array.register_written(FLASH_OPTKEYR, OPTKEY2, 0);
-        array.register_written(FLASH_OPTCR, GUARDED_OPTIONS, 0);
-        assert_eq!((array.options, array.option_register()), (FACTORY_OPTIONS, GUARDED_OPTIONS));
-        array.register_written(FLASH_OPTCR, GUARDED_OPTIONS | OPTSTRT, 0);
-        array.register_written(FLASH_OPTCR, GUARDED_OPTIONS | OPTLOCK, 0);
-        assert_eq!((array.options, array.option_writes), (GUARDED_OPTIONS, 1));
     }
 
     #[test]

@@ -84,11 +84,18 @@ impl Log {
         match kind {
             Type::U8 => u8::from_le_bytes(take(rest)).to_string(),
             Type::U16 => u16::from_le_bytes(take(rest)).to_string(),
-            Type::U32 => u32::from_le_bytes(take(rest)).to_string(),
+            Type::U32 | Type::Usize => u32::from_le_bytes(take(rest)).to_string(),
             Type::U64 => u64::from_le_bytes(take(rest)).to_string(),
             Type::Str => {
                 let length = u32::from_le_bytes(take(rest)) as usize;
                 let (text, others) = rest.split_at(length);
+                *rest = others;
+                String::from_utf8_lossy(text).into_owned()
+            }
+            // Text that was written piece by piece, and the byte that no text has.
+            Type::Display | Type::Debug => {
+                let end = rest.iter().position(|&byte| byte == 0xFF).expect("an end of the text");
+                let (text, others) = (&rest[..end], &rest[end + 1..]);
                 *rest = others;
                 String::from_utf8_lossy(text).into_owned()
             }

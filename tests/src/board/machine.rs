@@ -94,6 +94,13 @@ impl Machine {
         self.probe.tally().shorted = shorted.then_some(place);
     }
 
+    /// True for the part that ST made first: revision A, or what gives itself out as an STM32F2
+    /// (errata sheet, "MCU device ID is incorrect").
+    pub(super) fn is_first_revision(&self) -> bool {
+        let identity = self.probe.tally().identity;
+        identity.is_some_and(|identity| identity >> 16 == 0x1000 || identity & 0xFFF == 0x411)
+    }
+
     /// The charge on the strap's pin has gone.
     pub(super) fn release_strap(&mut self, at: u64) {
         if let Some(strap) = self.pins.strap {

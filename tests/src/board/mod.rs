@@ -9,6 +9,7 @@ mod amplifier;
 mod asked;
 mod bus;
 pub mod cache;
+mod clock;
 mod dac;
 pub mod elf;
 mod exti;
@@ -23,6 +24,7 @@ pub mod processor;
 pub mod record;
 mod rtt;
 mod run;
+pub mod semihosting;
 mod snapshot;
 mod stopped;
 pub mod tilt;
@@ -126,6 +128,9 @@ pub struct Wiring {
     pub supply_sense: bool,
     /// True if the motor's current is measured.
     pub current_monitor: bool,
+    /// True if the converter's output is wired to the current monitor's input, as the board's own
+    /// test asks for it.
+    pub loopback: bool,
     /// The part's supply when it is switched on, in millivolts.
     pub supply: u32,
     /// The period of the plant, in nanoseconds.
@@ -145,6 +150,7 @@ impl Default for Wiring {
             inclinometer: false,
             supply_sense: false,
             current_monitor: false,
+            loopback: false,
             supply: machine::RAIL_MILLIVOLTS,
             plant_period: 20_000,
             commissioned: true,

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use super::pins::PartPin;
+use super::semihosting::Host;
 
 /// One run of an interrupt handler, from the first instruction to the last, preemption excluded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -79,6 +80,8 @@ pub struct Tally {
     pub(super) shorted: Option<PartPin>,
     /// The part's identity, if it is to be another one (`DBGMCU_IDCODE`, RM0090 38.6.1).
     pub identity: Option<u32>,
+    /// The host that the program calls, if there is one.
+    pub host: Option<Host>,
     /// An upset still to come.
     pub upset: Option<Upset>,
     /// Instructions done in the exception the upset waits for.
@@ -90,7 +93,7 @@ impl Tally {
     pub(super) fn is_idle(&self) -> bool {
         let counts = self.counted.is_some() || self.count_lines || !self.masks.is_empty();
         let meddles = self.shorted.is_some() || self.identity.is_some() || self.upset.is_some();
-        !counts && !meddles
+        !counts && !meddles && self.host.is_none()
     }
 }
 

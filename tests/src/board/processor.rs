@@ -212,6 +212,26 @@ impl Probed {
         }
     }
 
+    /// True if the program has ended, as its host has been told.
+    fn has_ended(&self) -> bool {
+        self.probe.tally().host.as_ref().is_some_and(|host| host.status.is_some())
+    }
+
+    /// Has the host serve the call at which the core stands, if there is a host. How the stretch
+    /// ends, and the instruction that was done.
+    fn host_call(&mut self, bus: &mut Rerouted<'_>) -> (Exit, u64) {
+        let host = self.probe.tally().host.clone();
+        let Some(mut host) = host else {
+            self.core.answer_host_call(None);
+            return (Exit::Returned, 0);
+        };
+        let answer = host.serve(self.register(0), self.register(1), bus);
+        self.probe.tally().host = Some(host);
+        // Also a call that never returns: the core is for the next board, too.
+        self.core.answer_host_call(Some(answer.into()));
+        (Exit::Returned, 1)
+    }
+
     /// Does what goes wrong now; the instructions' time that it took.
     fn upset(&mut self) -> u64 {
         let exception = self.exception();
@@ -240,6 +260,9 @@ impl Probed {
 
 impl Processor for Probed {
     fn run(&mut self, budget: u32, bus: &mut dyn CoreBus) -> (Exit, u64) {
+        if self.has_ended() {
+            return (Exit::Waiting, 0);
+        }
         let flash = self.flash.clone();
         let (shorted, identity) = {
             let tally = self.probe.tally();
@@ -260,6 +283,8 @@ impl Processor for Probed {
         let watched = !self.breakpoints.is_empty();
         let (exit, retired) =
             if watched { self.run_watched(budget, &mut bus) } else { self.core.run(budget, &mut bus) };
+        let (exit, of_it) = if exit == Exit::HostCall { self.host_call(&mut bus) } else { (exit, 0) };
+        let retired = retired + of_it;
         // What kept the core from its instructions is time that has passed.
         let standstill = bus.standstill;
         self.stalled += standstill;
@@ -316,7 +341,7 @@ impl Processor for Probed {
     }
 
     fn waiting(&self) -> bool {
-        self.core.waiting()
+        self.has_ended() || self.core.waiting()
     }
 
     fn pc(&self) -> u64 {

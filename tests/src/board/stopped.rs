@@ -154,11 +154,13 @@ impl Stopped<'_> {
 
     /// Returns the firmware's actions that the manual does not describe.
     #[must_use]
-    pub fn violations(&self) -> Vec<String> {
-        let machine = self.session.board();
-        let flash = machine.flash.array().violations.clone();
-        let dac = machine.dac().violations().iter().cloned();
-        dac.chain(flash).chain(self.world.violations.iter().cloned()).collect()
+    pub fn violations(&mut self) -> Vec<String> {
+        let machine = self.session.board_mut();
+        let mut all = machine.usb().core.violations.clone();
+        all.extend(machine.flash.array().violations.iter().cloned());
+        all.extend(machine.dac().violations().iter().cloned());
+        all.extend(self.world.violations.iter().cloned());
+        all
     }
 
     /// Accesses that no register answered, and accesses refused because a clock was off: each with

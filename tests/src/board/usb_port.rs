@@ -70,7 +70,7 @@ impl Peer for UsbPort {
     }
 
     fn reset(&mut self) {
-        self.core = Core::default();
+        self.core.restart();
         self.next = None;
         self.line = false;
     }

@@ -10,8 +10,8 @@ use serde::{Deserialize, Serialize};
 
 use super::amplifier::Amplifier;
 use super::bus::DAC;
-use super::machine::{CLOCK_HZ, Machine, RAIL_MILLIVOLTS, pin};
-use super::pins::{Clock, register};
+use super::machine::{Machine, RAIL_MILLIVOLTS, pin};
+use super::pins::register;
 use super::plant::{Drive, Nanos, PlantSide};
 use super::tracks::{PULL_SETTLES, Tracks};
 use super::{SetValue, Timer, Wiring, rtt};
@@ -148,7 +148,7 @@ impl World {
             latch_at: None,
             strap_settles: None,
             amplifier: Amplifier::default(),
-            contacts: [true, true, wiring.current_monitor].map(Contact::closed_if),
+            contacts: [true, true, wiring.current_monitor || wiring.loopback].map(Contact::closed_if),
             violations: Vec::new(),
             painted: false,
             log: Log::default(),
@@ -188,8 +188,12 @@ impl World {
             self.next_step = at + self.wiring.plant_period;
             let asked = Drive { code: self.code, enabled: self.enabled };
             let drive = self.amplifier.drive(asked);
-            if self.wiring.current_monitor {
-                let millivolts = self.amplifier.monitor(asked, RAIL_MILLIVOLTS);
+            if self.wiring.current_monitor || self.wiring.loopback {
+                let millivolts = if self.wiring.loopback {
+                    u32::from(self.code.unwrap_or(0)) * RAIL_MILLIVOLTS / 4_096
+                } else {
+                    self.amplifier.monitor(asked, RAIL_MILLIVOLTS)
+                };
                 let channel =
                     adc::Channel::new(self.wiring.pins.monitor).expect("a converter has sixteen pins");
                 session.board_mut().part().adc[1].set_input(channel, millivolts);
@@ -286,8 +290,9 @@ const ADC_CR2: u64 = 0x4001_2008;
 const ADC2_CR2: u64 = 0x4001_2108;
 const ADC_CCR: u64 = 0x4001_2304;
 const RCC_CR: u64 = 0x4002_3800;
+pub(super) const RCC_CFGR: u64 = 0x4002_3808;
+pub(super) const FLASH_ACR: u64 = 0x4002_3C00;
 const HSEON: u64 = 1 << 16;
-const HSEBYP: u64 = 1 << 18;
 const RCC_AHB2RSTR: u64 = 0x4002_3814;
 const OTGFSRST: u64 = 1 << 7;
 
@@ -322,8 +327,9 @@ impl World {
                     }
                     ADC_CR2 | ADC2_CR2 if write && value & 1 != 0 => self.watch_converter(session, at),
                     RCC_CR if write && value & HSEON != 0 => self.start_clock(session, value),
+                    RCC_CFGR | FLASH_ACR if write => self.watch_wait_states(session, at),
                     RCC_AHB2RSTR if write && value & OTGFSRST != 0 => {
-                        session.board_mut().usb().core = super::otg::Core::default();
+                        session.board_mut().usb().core.restart();
                     }
                     _ => {}
                 }
@@ -363,14 +369,6 @@ impl World {
         if megahertz > 36 {
             self.violations.push(format!("an analogue-to-digital converter on {megahertz} MHz"));
         }
-    }
-
-    /// The oscillator is switched on: it swings only where it is what the board's clock needs
-    /// (RM0090 7.2.1). One that does not gives the PLL nothing.
-    fn start_clock(&self, session: &mut Session<Machine>, control: u64) {
-        let is_bypassed = control & HSEBYP != 0;
-        let fits = is_bypassed == (self.wiring.pins.clock == Clock::Elsewhere);
-        session.board_mut().part().rcc.attach_crystals(if fits { CLOCK_HZ } else { 0 }, 0);
     }
 
     /// Starts to drain the strap's pin by its pull-down if no strap is fitted.

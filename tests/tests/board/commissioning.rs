@@ -15,10 +15,11 @@ use control_core::units::{Damping, Millimetres, MillinewtonMetres, Stiffness};
 use device_sim::error::Error;
 use fixed::types::I16F16;
 use lab::commission::bench::{Act, Line};
-use lab::commission::{CommissioningOutcome, WeighWish, Wish, commission, weigh};
+use lab::commission::{CommissioningOutcome, CommissioningStep, WeighWish, Wish, commission, weigh};
 use link::Command;
 use link::commissioning::Record;
 use link::frames::CommandRefusal;
+use tests::board::flash::{FACTORY_OPTIONS, GUARDED_OPTIONS};
 use tests::board::wires::{Wire, Wires};
 use tests::board::{Board, MILLISECOND, Nanos, Wiring, plant};
 use tests::needle::Needle;
@@ -373,4 +374,31 @@ fn a_weight_on_the_needle_corrects_a_wrong_torque_constant() {
     let mut bench = Bench::on(Wiring::default(), true, swapped);
     let why = weigh(&mut bench, &wish, |_| Ok(())).expect_err("the other way round").to_string();
     assert!(why.contains("outwards") && why.contains("commission again"), "{why}");
+}
+
+/// A part from the factory: the step that sets its brown-out reset comes first, and what it has set
+/// counts after a restart.
+#[test]
+fn commissioning_sets_the_brown_out_reset_first() {
+    const LEFT: &str = "left";
+    let mut bench = Bench::new(false, Wires::default());
+    bench.board.flash().array().options = FACTORY_OPTIONS;
+    let steps_of = |bench: &mut Bench| {
+        bench.board.at_stop(|stopped| stopped.reset_by_pin());
+        bench.board.run_ms(50);
+        open_port(&mut bench.board);
+        let mut steps = Vec::new();
+        let wish = Wish { turns: 1, pull_mm: 40.0, counts_per_turn: None };
+        let ended = commission(bench, &wish, |step| {
+            steps.push(step);
+            if matches!(step, CommissioningStep::Turn(_)) { Err(Error::failed(LEFT)) } else { Ok(()) }
+        });
+        (steps, ended.map(|outcome| outcome.lines()).expect_err("it was left").to_string())
+    };
+    let (steps, said) = steps_of(&mut bench);
+    assert_eq!(steps, [CommissioningStep::GuardSupply]);
+    assert!(said.contains("has been set") && said.contains("switch the board off and on"), "{said}");
+    assert_eq!(bench.board.flash().array().options, GUARDED_OPTIONS);
+    let (steps, said) = steps_of(&mut bench);
+    assert_eq!((steps, said.as_str()), (vec![CommissioningStep::Turn(1)], LEFT));
 }

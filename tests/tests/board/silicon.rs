@@ -8,7 +8,6 @@ use control_core::units::{Damping, Millimetres, MillinewtonMetres, Stiffness};
 use fixed::types::{I8F24, I16F16};
 use link::Command;
 use link::frames::{CommandRefusal, EventKind, SaveError, Stage};
-use tests::board::flash::{FACTORY_OPTIONS, GUARDED_OPTIONS};
 use tests::board::pins::{DISCOVERY, NUCLEO_F429ZI};
 use tests::board::wires::Wires;
 use tests::board::{Board, MILLISECOND, Wiring, elf, firmware_path, image_for, plant};
@@ -143,9 +142,9 @@ fn a_configuration_is_saved_on_a_low_supply() {
     is_allowed(&mut rig.board);
 }
 
-/// RM0090 3.5.1: 168 MHz take 5 wait states from 2.7 V on and 6 below. ST's start-up code
-/// prefetches from revision 0x1001 on; the first revision reads as its number in the manual or, by
-/// the errata sheet, as an STM32F2.
+/// RM0090 3.5.1: 168 MHz take 5 wait states from 2.7 V on and 6 below, before the clock rises.
+/// ST's start-up code prefetches from revision 0x1001 on; the first revision reads as its number in
+/// the manual or, by the errata sheet, as an STM32F2.
 #[test]
 fn the_flash_has_time_on_the_lowest_supply() {
     const FLASH_ACR: u64 = 0x4002_3C00;
@@ -158,32 +157,8 @@ fn the_flash_has_time_on_the_lowest_supply() {
         let access = board.at_stop(|stopped| stopped.register(FLASH_ACR)).expect("a register");
         assert!(access & 0xF >= 6, "{access:#x}");
         assert_eq!(access & PREFETCH != 0, prefetches, "{identity:#x}: {access:#x}");
+        is_allowed(&mut board);
     }
-}
-
-/// RM0090 3.9.10: the brown-out reset is off from the factory.
-#[test]
-fn a_part_from_the_factory_gets_its_brown_out_reset_once() {
-    let mut board = board(plant::held());
-    board.flash().array().options = FACTORY_OPTIONS;
-    board.at_stop(|stopped| stopped.reset_by_pin());
-    board.run_ms(50);
-    assert_eq!(board.flash().array().options, GUARDED_OPTIONS, "level 2, and nothing else is changed");
-    board.at_stop(|stopped| stopped.reset_by_pin());
-    board.run_ms(50);
-    assert_eq!(board.flash().array().option_writes, 1);
-
-    // On a supply that is too low nothing is written, and no torque is given.
-    let mut rig = Rig::zeroed(Wiring { supply: 2_600, ..Wiring::default() });
-    rig.board.flash().array().options = FACTORY_OPTIONS;
-    rig.board.at_stop(|stopped| stopped.reset_by_pin());
-    rig.board.run_ms(50);
-    assert_eq!(rig.board.flash().array().options, FACTORY_OPTIONS);
-    rig.board.at_stop(|stopped| stopped.set_supply(3_000));
-    rig.pc.connect(&mut rig.board);
-    rig.pc.must(&mut rig.board, Command::Zero);
-    let why = rig.pc.must_not(&mut rig.board, Command::Start);
-    assert_eq!(why, CommandRefusal::Interlocked(Interlock::Supply));
 }
 
 /// UM1472: PC0 low would switch the 5 V of CN5 on, against the PC that feeds it, be it for the

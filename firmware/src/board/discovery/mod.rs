@@ -18,9 +18,7 @@
 //! | PC0 | power switch of CN5, for a host; low is on | always high: this is a device (UM1472, OTG) |
 //! | PD12, PD13, PD14 | lamps: green, running; orange, torque is on; red, a fault | LD4, LD3, LD5 on the board |
 
-use crate::chip::{
-    self, Begun, DriveLines, InclinometerPin, Lamps, Line, Parts, Source, Statics, Wired, Wiring,
-};
+use crate::chip::{self, Begun, DriveLines, InclinometerPin, Lamps, Line, Parts, Source, Wired, Wiring};
 use control_core::ceilings::Ceilings;
 use embedded_hal_bus::spi::{ExclusiveDevice, NoDelay};
 use firmware::drive::Drive;
@@ -43,11 +41,7 @@ impl Wiring for Discovery {
     /// as the overspeed trip of a usual encoder. Another motor is another image.
     const CEILINGS: Ceilings = Ceilings::new(100, 600);
 
-    fn init(
-        core: cortex_m::Peripherals,
-        device: pac::Peripherals,
-        statics: &'static mut Statics,
-    ) -> Parts<Self> {
+    fn init(core: cortex_m::Peripherals, device: pac::Peripherals) -> Parts<Self> {
         let mut begun = Begun::new(device.RCC, Source::Crystal);
         let rcc = &mut begun.rcc;
         let gpioa = device.GPIOA.split(rcc);
@@ -86,7 +80,7 @@ impl Wiring for Discovery {
         let lamps = Lamps::new(gpiod.pd12, gpiod.pd13, gpiod.pd14);
 
         let wired = Wired { encoder, drive, drive_lines, tilt, lamps };
-        Parts::start(begun, core, chip::own!(device, gpioa), wired, statics)
+        Parts::new(begun, core, chip::own!(device, gpioa), wired)
     }
 }
 
@@ -98,7 +92,7 @@ fn accelerometer(
     rcc: &mut Rcc,
 ) -> BoardTilt {
     let mode = Mode { polarity: Polarity::IdleHigh, phase: Phase::CaptureOnSecondTransition };
-    let bus = spi.spi((Some(sck), Some(miso), Some(mosi)), mode, timing::TILT_SPI_HZ.Hz(), rcc);
+    let bus = spi.spi((Some(sck), Some(miso), Some(mosi)), mode, timing::TILT_SPI_ASKED_HZ.Hz(), rcc);
     let Ok(device) = ExclusiveDevice::new_no_delay(bus, select.into_push_pull_output());
     BoardTilt::OnBoard(Accelerometer::new(device))
 }

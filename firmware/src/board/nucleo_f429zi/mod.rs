@@ -18,9 +18,7 @@
 //! | PG6 | power switch of CN13, for a host | low, always: this is a device |
 //! | PB0, PB7, PB14 | lamps: green, running; blue, torque is on; red, a fault | LD1, LD2, LD3 on the board |
 
-use crate::chip::{
-    self, Begun, DriveLines, InclinometerPin, Lamps, Line, Parts, Source, Statics, Wired, Wiring,
-};
+use crate::chip::{self, Begun, DriveLines, InclinometerPin, Lamps, Line, Parts, Source, Wired, Wiring};
 use control_core::ceilings::Ceilings;
 use firmware::drive::Drive;
 use firmware::tilt::Inclinometer;
@@ -38,11 +36,7 @@ impl Wiring for NucleoF429zi {
     /// As the Discovery's: 10 N at a roller of 10 mm, and 0.6 m/s. Another motor is another image.
     const CEILINGS: Ceilings = Ceilings::new(100, 600);
 
-    fn init(
-        core: cortex_m::Peripherals,
-        device: pac::Peripherals,
-        statics: &'static mut Statics,
-    ) -> Parts<Self> {
+    fn init(core: cortex_m::Peripherals, device: pac::Peripherals) -> Parts<Self> {
         // 8 MHz from the debugger's own microcontroller, which has to have power (UM1974, HSE
         // clock).
         let mut begun = Begun::new(device.RCC, Source::Bypass);
@@ -73,6 +67,6 @@ impl Wiring for NucleoF429zi {
         let lamps = Lamps::new(gpiob.pb0, gpiob.pb7, gpiob.pb14);
 
         let wired = Wired { encoder, drive, drive_lines, tilt, lamps };
-        Parts::start(begun, core, chip::own!(device, gpioa), wired, statics)
+        Parts::new(begun, core, chip::own!(device, gpioa), wired)
     }
 }

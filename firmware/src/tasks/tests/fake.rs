@@ -20,6 +20,7 @@ use core::convert::Infallible;
 use core::sync::atomic::Ordering::Relaxed;
 use embedded_hal::digital::{ErrorType, OutputPin};
 use link::device::Waiting;
+use link::frames::GuardRefusal;
 use std::boxed::Box;
 use std::collections::VecDeque;
 use std::thread_local;
@@ -51,6 +52,7 @@ pub(super) struct World {
     pub(super) flash_fails: Cell<bool>,
     pub(super) program_cycles: Cell<u32>,
     pub(super) lamps: Cell<(bool, bool)>,
+    pub(super) guarded: Cell<u32>,
 }
 
 thread_local! {
@@ -96,6 +98,11 @@ impl Board for Fake {
 
     fn allow_usb(allowed: bool) {
         world().usb_allowed.set(allowed);
+    }
+
+    fn guard_supply(set: bool) -> Result<(), GuardRefusal> {
+        world().guarded.set(world().guarded.get() + 1);
+        if set { Err(GuardRefusal::Restart) } else { Err(GuardRefusal::Off) }
     }
 }
 

@@ -14,7 +14,7 @@ use core::sync::atomic::Ordering::Relaxed;
 use link::Command;
 use link::codec::MAX_FRAME;
 use link::device::Identity;
-use link::frames::{CommandRefusal, DeviceFrame, EventKind, PROTOCOL_VERSION, SaveError};
+use link::frames::{CommandRefusal, DeviceFrame, EventKind, GuardRefusal, PROTOCOL_VERSION, SaveError};
 use link::host::{Commands, Reception};
 use std::vec::Vec;
 
@@ -219,4 +219,19 @@ fn a_configuration_is_refused_until_the_tick_has_taken_the_start() {
     assert_eq!(desk.answer(Command::ConfigureDevice(config)), Err(CommandRefusal::Powered));
     assert_eq!(desk.answer(Command::Stop), Ok(()), "which makes the start void");
     assert_eq!(desk.answer(Command::ConfigureDevice(config)), Ok(()));
+}
+
+#[test]
+fn the_brown_out_reset_is_set_with_torque_off_only() {
+    let mut desk = Desk::in_session();
+    for (set, said) in [(false, GuardRefusal::Off), (true, GuardRefusal::Restart)] {
+        let answer = desk.answer(Command::GuardSupply { set });
+        assert_eq!(answer, Err(CommandRefusal::Guard(said)));
+    }
+    assert_eq!(world().guarded.get(), 2);
+    // The tick has powered up; the link's last sample was of a tick without torque.
+    desk.shared.powered.store(true, Relaxed);
+    assert_eq!(desk.answer(Command::GuardSupply { set: true }), Err(CommandRefusal::Powered));
+    assert_eq!(world().guarded.get(), 2, "nothing has stopped the processor");
+    assert!(!desk.shared.conditions.get().contains(Interlock::Saving));
 }

@@ -17,6 +17,7 @@ use device_sim::error::Error;
 use findings::{CommissioningError, Mechanism};
 use fixed::types::I16F16;
 use link::commissioning::Record;
+use link::frames::GuardRefusal;
 use std::fmt;
 use std::time::Duration;
 
@@ -49,6 +50,8 @@ pub struct Wish {
 /// The next step, announced before it is done.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum CommissioningStep {
+    /// The device sets the brown-out reset, which is off.
+    GuardSupply,
     /// The person turns the roller.
     Turn(u32),
     /// The person draws something through.
@@ -76,6 +79,9 @@ impl CommissioningStep {
 impl fmt::Display for CommissioningStep {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
+            CommissioningStep::GuardSupply => f.write_str(
+                "torque stays off: the brown-out reset, which ends a core whose supply fails, is off on this board and is set now, in its option bytes; leave the board's power on meanwhile",
+            ),
             CommissioningStep::Turn(turns) => write!(
                 f,
                 "torque stays off: turn the roller by exactly {turns} turns in the direction of insertion, then let go"
@@ -186,6 +192,7 @@ pub async fn commission(
     mut ask: impl AsyncFnMut(CommissioningStep) -> Result<(), Error>,
 ) -> Result<CommissioningOutcome, Error> {
     let mut bench = Bench::open(line).await?;
+    guard_supply(&mut bench, &mut ask).await?;
     let before = bench.device().await?;
     // Whatever it was: until it has passed again it is not commissioned, and the forces that were
     // found are another device's.
@@ -256,6 +263,21 @@ async fn prove(
         mechanism,
         stiffness_lowered,
     })
+}
+
+/// Sees that a brown-out reset guards the supply, for no pulse is played without; one that is off
+/// is set if the person agrees.
+async fn guard_supply(
+    bench: &mut Bench<'_>,
+    ask: &mut impl AsyncFnMut(CommissioningStep) -> Result<(), Error>,
+) -> Result<(), Error> {
+    let mut answer = bench.guard_supply(false).await?;
+    if answer == Err(GuardRefusal::Off) {
+        ask(CommissioningStep::GuardSupply).await?;
+        bench.settle().await?;
+        answer = bench.guard_supply(true).await?;
+    }
+    answer.map_err(Error::failed)
 }
 
 /// Finds the mechanism by pulses, and whether the motor's leads are reversed; then the device

@@ -51,6 +51,10 @@ pub struct Core {
     frame: u16,
     /// True if the end of endpoint 0's SETUP stage has not been announced yet.
     setup_open: bool,
+    /// True if a soft reset never ends, as where the transceiver brings no clock.
+    pub hangs_in_reset: bool,
+    /// The firmware's actions that the manual does not describe.
+    pub(super) violations: Vec<String>,
 }
 
 impl Default for Core {
@@ -68,11 +72,19 @@ impl Default for Core {
             suspended: false,
             frame: 0,
             setup_open: false,
+            hangs_in_reset: false,
+            violations: Vec::new(),
         }
     }
 }
 
 impl Core {
+    /// As out of reset; what is wrong with the part stays.
+    pub(super) fn restart(&mut self) {
+        let violations = std::mem::take(&mut self.violations);
+        *self = Self { hangs_in_reset: self.hangs_in_reset, violations, ..Self::default() };
+    }
+
     fn stored(&self, offset: u64) -> u32 {
         self.stored.get(&offset).copied().unwrap_or(match offset {
             CID => CORE_ID,
@@ -137,7 +149,7 @@ impl Core {
     /// A firmware read of the word at `offset`.
     pub fn read(&mut self, offset: u64) -> u32 {
         match offset {
-            GRSTCTL => self.stored(GRSTCTL) | GRSTCTL_AHBIDL,
+            GRSTCTL => self.stored(GRSTCTL) | GRSTCTL_AHBIDL | u32::from(self.hangs_in_reset),
             GINTSTS => self.pending(),
             GINTMSK => self.interrupt_mask,
             GRXSTSR => self.receive.look(),
@@ -225,10 +237,17 @@ impl Core {
 
     fn reset_or_flush(&mut self, value: u32) {
         if value & GRSTCTL_CSRST != 0 {
+            // It ends some clocks of the transceiver later, which has to have power (34.16.2,
+            // `CSRST` and `PWRDWN`).
+            if self.stored(registers::GCCFG) & GCCFG_PWRDWN == 0 {
+                self.violations.push("the USB core is reset with its transceiver powered down".into());
+            }
             // The soft reset keeps the configuration registers, 34.16.2.
             let kept = [registers::GCCFG, registers::DCFG, registers::GAHBCFG, 0x00C]
                 .map(|offset| (offset, self.stored.get(&offset).copied()));
-            *self = Self { frame: self.frame, ..Self::default() };
+            let frame = self.frame;
+            self.restart();
+            self.frame = frame;
             self.stored.extend(kept.into_iter().filter_map(|(offset, value)| Some((offset, value?))));
             return;
         }
