@@ -241,8 +241,13 @@ fn missing(logs: &[Log], found: &BTreeMap<Role, Chosen>, known: Known) -> Vec<St
         questions.push(roles::missing(logs, Role::Reference).to_string());
     } else if !found.contains_key(&Role::Command) && !known.undriven && !known.error_as_command {
         questions.push(format!(
-            "{}; or give --undriven where nothing drives the axis, or --error-as-command where a position loop ran: the command is reference − position then",
-            roles::missing(logs, Role::Command)
+            "{}; or give --undriven where nothing drives the axis{}",
+            roles::missing(logs, Role::Command),
+            if found.contains_key(&Role::Reference) {
+                ", or --error-as-command where a position loop ran: the command is reference − position then"
+            } else {
+                ""
+            }
         ));
     }
     questions
