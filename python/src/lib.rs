@@ -108,6 +108,7 @@ fn import_recording(
     out: PathBuf,
     columns: Vec<String>,
     counts_per_turn: Option<f64>,
+    (rate_hz, undriven, split): (Option<f64>, bool, Option<f64>),
 ) -> PyResult<(PathBuf, Vec<PathBuf>, Vec<String>)> {
     py.detach(|| {
         let columns = columns
@@ -115,7 +116,16 @@ fn import_recording(
             .map(|text| import::choice(text))
             .collect::<Result<Vec<_>, _>>()
             .map_err(refused)?;
-        let request = import::Request { files, columns, counts_per_turn, out, ..import::Request::default() };
+        let known = import::Known { rate_hz, undriven, ..import::Known::default() };
+        let request = import::Request {
+            files,
+            columns,
+            counts_per_turn,
+            out,
+            known,
+            split,
+            ..import::Request::default()
+        };
         let imported = import::import(&request).map_err(refused)?;
         let paths = imported.recordings.into_iter().map(|one| one.path).collect();
         Ok((imported.rig, paths, imported.notes))

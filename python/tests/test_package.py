@@ -103,6 +103,10 @@ def test_a_table_of_degrees_is_imported(frames, tmp_path):
     assert imported.rig.is_file() and len(imported.recordings) == 1
     read = pd.read_csv(imported.recordings[0])
     assert np.abs(np.diff(read["position_counts"])).max() < 1000
+    table.drop(columns=["t", "current"]).to_csv(tmp_path / "bare.csv", index=False)
+    options = {"rate": 500.0, "undriven": True, "split": 0.6, "counts_per_turn": 8192}
+    imported = nd.import_recording(tmp_path / "bare.csv", out=tmp_path / "bare", columns=hints[2:], **options)
+    assert [path.name for path in imported.recordings] == ["fit.csv", "holdout.csv"]
 
 
 @pytest.mark.parametrize(

@@ -103,17 +103,21 @@ pub fn export(recording: &Recording, dir: &Path) -> Result<Exported, Error> {
     Ok(Exported { rig: rig_path, recordings })
 }
 
-/// Writes a file by `fill`; an error names its path.
+/// Writes a file by `fill`, whole or not at all; an error names its path.
 pub fn write(
     path: &Path,
     fill: impl FnOnce(&mut BufWriter<std::fs::File>) -> std::io::Result<()>,
 ) -> Result<(), Error> {
-    let written = std::fs::File::create(path).and_then(|file| {
+    let half = path.with_file_name(format!(".{}.part", path.file_name().unwrap_or_default().display()));
+    let written = std::fs::File::create(&half).and_then(|file| {
         let mut out = BufWriter::new(file);
         fill(&mut out)?;
-        out.flush()
+        out.into_inner().map_err(std::io::IntoInnerError::into_error)?.sync_all()?;
+        std::fs::rename(&half, path)
     });
     written.map_err(|cause| {
+        // What was written of it serves nobody.
+        let _ = std::fs::remove_file(&half);
         Error::failed(format_args!(
             "{}: cannot be written ({cause}); free some space or choose another --out",
             path.display()

@@ -6,9 +6,10 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 
 /// The features that `host-sim` has too.
-const FEATURES: [(&str, bool); 4] = [
+const FEATURES: [(&str, bool); 5] = [
     ("class", cfg!(feature = "class")),
     ("foxglove", cfg!(feature = "foxglove")),
+    ("hdf5", cfg!(feature = "hdf5")),
     ("parquet", cfg!(feature = "parquet")),
     ("ros", cfg!(feature = "ros")),
 ];

@@ -99,3 +99,24 @@ fn what_it_has_is_not_handed_over() {
     assert_eq!(missing.status.code(), Some(1));
     assert!(text(&missing.stderr).contains("cargo build --release"), "{}", text(&missing.stderr));
 }
+
+#[test]
+fn every_feature_of_the_whole_program_is_handed_on() {
+    let read = |file: &str| {
+        fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(file)).expect("it is there")
+    };
+    let features = |manifest: &str| -> Vec<String> {
+        let table =
+            manifest.split("[features]").nth(1).and_then(|rest| rest.split("\n[").next()).expect("features");
+        table
+            .lines()
+            .filter_map(|line| Some(line.split_once(" = ")?.0.to_owned()))
+            .filter(|name| !name.starts_with('#'))
+            .collect()
+    };
+    let (whole, own, handed) =
+        (features(&read("../Cargo.toml")), features(&read("Cargo.toml")), read("src/whole.rs"));
+    for name in &whole {
+        assert!(own.contains(name) && handed.contains(&format!("(\"{name}\", cfg!")), "{name}: {own:?}");
+    }
+}

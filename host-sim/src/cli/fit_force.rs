@@ -1,9 +1,11 @@
 //! `host-sim fit-force`.
 
 use clap::Args;
+use convert::export::write;
 use device_sim::error::Error;
 use lab::force_fit::{self, Fit, insertions, page, table::Origin, writer};
 use live::{examples, say};
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 /// Fit the force table of Paper 000, F(depth, speed, angle), to insertions at several speeds and
@@ -41,7 +43,13 @@ impl FitForce {
         let (seen, unseen) = (read(&self.files)?, read(&self.holdout)?);
         let fit = force_fit::fit(seen, &unseen)
             .ok_or_else(|| Error::input("the recordings hold no insertion to fit to; give others"))?;
-        save(&self.out, &writer::toml(&fit))?;
+        let table = writer::toml(&fit);
+        if table.contains("NaN") || table.contains("inf") {
+            return Err(Error::input(
+                "the fit has no finite table: are depth_mm and force_n in mm and N, positive into the tissue and against insertion?",
+            ));
+        }
+        save(&self.out, &table)?;
         let shown = self.out.with_extension("html");
         save(&shown, &page::html(&fit))?;
         say!("{}", self.out.display());
@@ -52,9 +60,7 @@ impl FitForce {
 }
 
 fn save(path: &Path, text: &str) -> Result<(), Error> {
-    std::fs::write(path, text).map_err(|cause| {
-        Error::failed(format_args!("{}: cannot be written ({cause}); choose another --out", path.display()))
-    })
+    write(path, |out| out.write_all(text.as_bytes()))
 }
 
 fn report(fit: &Fit) {

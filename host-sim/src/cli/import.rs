@@ -1,7 +1,7 @@
 //! `host-sim import`: recordings as people have them, made into what `diagnose` reads.
 
 use clap::Args;
-use convert::import::{self, Keep, Known, Request, RigValues};
+use convert::import::{self, Decimal, Keep, Known, Request, RigValues};
 use convert::shell::quoted;
 use device_sim::error::Error;
 use live::{examples, note, say};
@@ -28,11 +28,24 @@ pub(crate) struct Import {
     /// Folder to write to; created if missing
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// The column of the time, command, position, velocity, reference, tilt or force, and its unit;
-    /// a minus before the name changes the sign, FILE/NAME is a column of one file, and none leaves
-    /// the role empty
+    /// The column of the time, command, position, velocity, reference, tilt, force or enabled (1
+    /// where the drive was on), and its unit; a minus before the name changes the sign, FILE/NAME is
+    /// a column of one file, and none leaves the role empty
     #[arg(long, value_name = "ROLE=NAME[:UNIT]")]
     column: Vec<String>,
+    /// The column with the time stamps of one role, where channels have clocks of their own
+    #[arg(long, value_name = "ROLE=NAME[:UNIT]")]
+    clock: Vec<String>,
+    /// The sign of whole numbers of a role: int16 (two's complement), sign10 (in bit 10) or
+    /// plain
+    #[arg(long, value_name = "ROLE=ENCODING")]
+    encoding: Vec<String>,
+    /// The sign before the decimals of numbers as text; the other one separates thousands
+    #[arg(long, value_name = "SIGN")]
+    decimal: Option<Sign>,
+    /// Row K of every N, where the rows of N axes alternate
+    #[arg(long, value_name = "K/N")]
+    rows: Option<String>,
     /// Rows per second, if no column has the time
     #[arg(long, value_name = "HZ")]
     rate: Option<f64>,
@@ -42,6 +55,10 @@ pub(crate) struct Import {
     /// Nothing drives the axis: the command is zero
     #[arg(long)]
     undriven: bool,
+    /// A position loop drives the axis and its command was not logged: the command is reference −
+    /// position, and the gain the loop's stiffness
+    #[arg(long, conflicts_with = "undriven")]
+    error_as_command: bool,
     /// Encoder counts per turn of the coordinate
     #[arg(long, value_name = "N")]
     counts_per_turn: Option<f64>,
@@ -66,6 +83,32 @@ pub(crate) struct Import {
     /// Keep positions that jump by a turn
     #[arg(long)]
     keep_wraps: bool,
+    /// Keep rows whose position jumps away and back, and positions that begin again
+    #[arg(long)]
+    keep_outliers: bool,
+}
+
+/// The sign before decimals.
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum Sign {
+    /// 1.5, and 1,000
+    Point,
+    /// 1,5, and 1.000
+    Comma,
+    /// 1.5 and 1,5
+    Both,
+}
+
+/// Reads `--rows K/N`.
+fn every(text: &str) -> Result<(usize, usize), Error> {
+    let read = || {
+        let (first, step) = text.split_once('/')?;
+        let (first, step) = (first.parse().ok()?, step.parse().ok()?);
+        (1..=step).contains(&first).then_some((first, step))
+    };
+    read().ok_or_else(|| {
+        Error::input(format_args!("--rows {text}: give it as --rows 1/2, the first of every two rows"))
+    })
 }
 
 impl Import {
@@ -90,16 +133,29 @@ impl Import {
             )));
         }
         let columns = self.column.iter().map(|text| import::choice(text)).collect::<Result<_, _>>()?;
+        let clocks = self.clock.iter().map(|text| import::clock_choice(text)).collect::<Result<_, _>>()?;
+        let encodings = self.encoding.iter().map(|text| import::encoding(text)).collect::<Result<_, _>>()?;
+        let decimal = self.decimal.map(|sign| match sign {
+            Sign::Point => Decimal::Point,
+            Sign::Comma => Decimal::Comma,
+            Sign::Both => Decimal::Both,
+        });
+        let known =
+            Known { rate_hz: self.rate, undriven: self.undriven, error_as_command: self.error_as_command };
         let done = import::import(&Request {
             files: self.files,
             columns,
-            known: Known { rate_hz: self.rate, undriven: self.undriven },
+            clocks,
+            encodings,
+            decimal,
+            every: self.rows.as_deref().map(every).transpose()?,
+            known,
             counts_per_turn: self.counts_per_turn,
             counts_per_unit: self.counts_per_unit,
             values: RigValues { inertia: self.inertia, gain: self.gain },
             rig: self.rig,
             runs: self.runs,
-            keep: Keep { idle: self.keep_idle, wraps: self.keep_wraps },
+            keep: Keep { idle: self.keep_idle, wraps: self.keep_wraps, outliers: self.keep_outliers },
             split: self.split,
             out: self.out.clone(),
         })?;

@@ -1,6 +1,7 @@
 //! `host-sim simulate`: the motion that a user sees, compared with the recording.
 
 use clap::Args;
+use convert::export::write;
 use convert::simulated;
 use device_sim::error::Error;
 use diagnosis::recording::Recording;
@@ -10,6 +11,7 @@ use diagnosis::simulation::comparison::Comparison;
 use diagnosis::simulation::replay::WINDOWS_S;
 use diagnosis::simulation::value_fit;
 use live::{examples, say};
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 /// Run the nominal, refitted and patched simulation and compare them with a recording: free run,
@@ -154,16 +156,13 @@ impl Simulate {
     }
 
     fn write(&self, files: &[(String, Vec<u8>)]) -> Result<(), Error> {
-        let write = || {
-            std::fs::create_dir_all(&self.out)?;
-            files.iter().try_for_each(|(name, bytes)| std::fs::write(self.out.join(name), bytes))
-        };
-        write().map_err(|cause| {
+        std::fs::create_dir_all(&self.out).map_err(|cause| {
             Error::failed(format_args!(
-                "{}: cannot be written ({cause}); free some space or choose another --out",
+                "{}: the folder cannot be made ({cause}); choose another --out",
                 self.out.display()
             ))
-        })
+        })?;
+        files.iter().try_for_each(|(name, bytes)| write(&self.out.join(name), |out| out.write_all(bytes)))
     }
 }
 

@@ -30,5 +30,7 @@ mod safety_page;
 mod serial;
 mod settle;
 mod simulate;
+mod strangers;
+mod strangers_kept;
 mod streams;
 mod training;

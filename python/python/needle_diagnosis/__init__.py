@@ -128,11 +128,12 @@ def simulate(rig, recording):
     return _pandas.DataFrame({"time_s": time_s, "position": position, "velocity": velocity})
 
 
-def import_recording(*files, out, columns=(), counts_per_turn=None):
+def import_recording(*files, out, columns=(), counts_per_turn=None, rate=None, undriven=False, split=None):
     """Turns files as people have them into a folder that diagnose reads, as host-sim import does.
 
-    columns: hints such as "position=theta:deg"."""
-    rig, recordings, notes = _native.import_recording(
-        [_os.fspath(file) for file in files], _os.fspath(out), list(columns), counts_per_turn
-    )
+    columns: hints such as "position=theta:deg". rate: rows a second, where no column has the time.
+    undriven: the command is zero. split: the part of each run that is fitted, such as 0.6; the rest is held out."""
+    paths = [_os.fspath(file) for file in files]
+    known = (rate, undriven, split)
+    rig, recordings, notes = _native.import_recording(paths, _os.fspath(out), list(columns), counts_per_turn, known)
     return Imported(_Path(rig), [_Path(one) for one in recordings], notes)

@@ -1,12 +1,14 @@
 //! Reads a file of any known format into tables.
 
+use super::numbers::Decimal;
 use super::table::{Column, Log};
 use super::{json, log, mat, npy, text};
 use device_sim::error::Error;
 use std::path::Path;
 
-/// Reads a file of any format that is known, recognised by its first bytes and its name's ending.
-pub(super) fn read(path: &Path) -> Result<Log, Error> {
+/// Reads a file of any format that is known, recognised by its first bytes and its name's ending;
+/// `decimal` is what a person said of numbers as text.
+pub(super) fn read(path: &Path, decimal: Option<Decimal>) -> Result<Log, Error> {
     let file = path.display().to_string();
     let bytes = std::fs::read(path)
         .map_err(|cause| Error::input(format_args!("{file}: cannot be read ({cause}); check its path")))?;
@@ -33,12 +35,10 @@ pub(super) fn read(path: &Path) -> Result<Log, Error> {
     {
         json::read(&file, &text::decode(&bytes))?
     } else {
-        text::read(&file, &bytes)?
+        text::read(&file, &bytes, decimal)?
     };
-    for table in &mut log.tables {
-        table.columns.retain(Column::has_numbers);
-    }
-    log.tables.retain(|table| !table.columns.is_empty());
+    // Columns without numbers stay, so that numbers count the file's columns.
+    log.tables.retain(|table| table.columns.iter().any(Column::has_numbers));
     if log.tables.is_empty() {
         return Err(Error::input(format_args!("{file}: holds no column of numbers; is it the right file?")));
     }

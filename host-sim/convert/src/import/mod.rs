@@ -2,18 +2,27 @@
 //! was assumed, changed or left out on the way is said. It reads tables and writes the contract's
 //! files; it may not know what is done with them.
 
+mod clocks;
+mod column_units;
 mod encoder_resolution;
+mod encodings;
 mod file;
 mod folder;
+mod gather;
 #[cfg(feature = "hdf5")]
 mod hdf5;
+mod header;
+mod in_force;
 mod json;
+mod layout;
 mod log;
 mod mat;
 mod npy;
 mod npy_array;
+mod numbers;
 #[cfg(feature = "parquet")]
 mod parquet;
+mod readings;
 mod role;
 mod roles;
 #[cfg(feature = "ros")]
@@ -21,18 +30,23 @@ mod ros;
 mod rows;
 mod runs;
 mod separate;
+mod stamps;
+mod suggestion;
 mod table;
 mod text;
 mod units;
 mod writer;
 
-pub use roles::{Choice, choice};
+pub use encodings::{RoleEncoding, encoding};
+pub use numbers::Decimal;
+pub use roles::{Choice, choice, clock_choice};
 pub use rows::Known;
 pub use runs::Keep;
 pub use writer::RigValues;
 
 use device_sim::error::Error;
 use diagnosis::rig::{Kind, Rig};
+use gather::Said;
 use rows::Rows;
 use std::f64::consts::TAU;
 use std::path::PathBuf;
@@ -46,6 +60,14 @@ pub struct Request {
     pub files: Vec<PathBuf>,
     /// `--column`.
     pub columns: Vec<Choice>,
+    /// `--clock`.
+    pub clocks: Vec<Choice>,
+    /// `--encoding`.
+    pub encodings: Vec<RoleEncoding>,
+    /// `--decimal`.
+    pub decimal: Option<Decimal>,
+    /// `--rows K/N`: row K of every N, counted from 1.
+    pub every: Option<(usize, usize)>,
     /// Rate or missing command.
     pub known: Known,
     /// Counts per turn of the coordinate.
@@ -98,8 +120,13 @@ pub fn import(request: &Request) -> Result<Imported, Error> {
         None => None,
     };
     let paths = folder::files(&request.files)?;
-    let logs = paths.iter().map(|path| file::read(path)).collect::<Result<Vec<_>, _>>()?;
-    for log in &logs {
+    let mut logs =
+        paths.iter().map(|path| file::read(path, request.decimal)).collect::<Result<Vec<_>, _>>()?;
+    for log in &mut logs {
+        if let Some((first, step)) = request.every {
+            log.keep_every(first, step);
+        }
+        clocks::prepare(log);
         notes.extend(log.notes.iter().map(|note| format!("{}: {note}", log.file)));
     }
     roles::check(&logs, &request.columns)?;
@@ -112,7 +139,7 @@ pub fn import(request: &Request) -> Result<Imported, Error> {
     }
     let Some(first) = all.first() else {
         return Err(Error::input(format_args!(
-            "{}: no stretch of at least a second is left ({}); record longer, or check the unit of the time with --column time=NAME:ms",
+            "{}: no stretch of at least a second is left ({}); record longer, or check the time and its unit with --column time=NAME:ms",
             request.files.iter().map(|f| f.display().to_string()).collect::<Vec<_>>().join(", "),
             notes.join("; ")
         )));
@@ -145,18 +172,20 @@ pub fn import(request: &Request) -> Result<Imported, Error> {
 /// The rows of the files: each file's own where each has all columns, with one that goes on where
 /// another ends joined to it; else those of all files together.
 fn wholes(logs: &[Log], request: &Request, notes: &mut Vec<String>) -> Result<Vec<Rows>, Error> {
-    let is_whole = |log: &Log| rows::is_whole(std::slice::from_ref(log), &request.columns, request.known);
+    let Request { columns, clocks, encodings, known, .. } = request;
+    let said = Said { columns, clocks, encodings, known: *known };
+    let is_whole = |log: &Log| gather::is_whole(std::slice::from_ref(log), said);
     let one_run = logs.len() > 1 && request.columns.iter().any(|choice| choice.names_a_file(logs));
     if one_run || !logs.iter().all(is_whole) {
-        return Ok(vec![rows::gather(logs, &request.columns, request.known, notes)?]);
+        return Ok(vec![gather::gather(logs, said, notes)?]);
     }
     let mut wholes = Vec::new();
     for (index, log) in logs.iter().enumerate() {
-        let mut said = Vec::new();
-        wholes.push(rows::gather(std::slice::from_ref(log), &request.columns, request.known, &mut said)?);
+        let mut of_file = Vec::new();
+        wholes.push(gather::gather(std::slice::from_ref(log), said, &mut of_file)?);
         // The same columns of further files need no further words.
         if index == 0 {
-            notes.extend(said);
+            notes.extend(of_file);
         }
     }
     if !request.runs {
@@ -214,7 +243,11 @@ fn joined(wholes: Vec<Rows>, notes: &mut Vec<String>) -> Vec<Rows> {
 fn rate(runs: &[Rows], notes: &mut Vec<String>) {
     let steps: Vec<f64> = runs.iter().filter_map(|run| rows::median_step(&run.time)).collect();
     let Some(step) = steps.into_iter().max_by(f64::total_cmp) else { return };
-    notes.push(diagnosis::recording::shown_at(1.0 / step));
+    let hz = 1.0 / step;
+    if !(clocks::SLOWEST_HZ..clocks::FASTEST_HZ).contains(&hz) {
+        notes.push(format!("{hz:.3} rows a second, where diagnose reads 20 to 20000"));
+    }
+    notes.push(diagnosis::recording::shown_at(hz));
 }
 
 /// Names of the files, and the runs cut in two where that was asked for.

@@ -20,12 +20,22 @@ pub enum Role {
     Tilt,
     /// A measured external load.
     Force,
+    /// 1 where the drive was on, 0 where it was off.
+    Enabled,
 }
 
 impl Role {
     /// All of them.
-    pub const ALL: [Self; 7] =
-        [Self::Time, Self::Command, Self::Position, Self::Velocity, Self::Reference, Self::Tilt, Self::Force];
+    pub const ALL: [Self; 8] = [
+        Self::Time,
+        Self::Command,
+        Self::Position,
+        Self::Velocity,
+        Self::Reference,
+        Self::Tilt,
+        Self::Force,
+        Self::Enabled,
+    ];
 
     /// As `--column` has it.
     pub fn name(self) -> &'static str {
@@ -37,19 +47,21 @@ impl Role {
             Self::Reference => "reference",
             Self::Tilt => "tilt",
             Self::Force => "force",
+            Self::Enabled => "enabled",
         }
     }
 
-    /// The quantities that its unit may measure.
+    /// The quantities that its unit may measure. A position, a speed or a time is no command.
     pub(super) fn takes(self, quantity: Quantity) -> bool {
         use Quantity as Q;
         match self {
             Self::Time => quantity == Q::Time,
-            Self::Command => !matches!(quantity, Q::Time | Q::Counts),
+            Self::Command => matches!(quantity, Q::Torque | Q::Force | Q::Current | Q::Voltage | Q::Plain),
             Self::Position | Self::Reference => matches!(quantity, Q::Angle | Q::Length | Q::Counts),
             Self::Velocity => matches!(quantity, Q::AngularSpeed | Q::Speed),
             Self::Tilt => quantity == Q::Angle,
             Self::Force => matches!(quantity, Q::Torque | Q::Force),
+            Self::Enabled => quantity == Q::Plain,
         }
     }
 }

@@ -1,8 +1,9 @@
 //! Which column is what: given by `--column`, else from the names that people give.
 
 use super::role::Role;
+use super::suggestion::{Axes, is_error, suggested};
 use super::table::{Column, Log};
-use super::units::{self, Quantity, Unit};
+use super::units::{self, Unit};
 use crate::shell::quoted;
 use device_sim::error::Error;
 use std::path::Path;
@@ -38,6 +39,9 @@ impl Choice {
     }
 }
 
+/// Advice where a log has no command.
+const NO_COMMAND: &str = "a position or a speed is no command: where a position loop ran, --error-as-command takes reference − position as the command";
+
 /// Reads one `--column`.
 pub fn choice(text: &str) -> Result<Choice, Error> {
     let form = "give it as --column position=theta:deg";
@@ -61,17 +65,45 @@ pub fn choice(text: &str) -> Result<Choice, Error> {
     };
     if let Some(unit) = unit
         && !role.takes(unit.quantity)
+        && !(role == Role::Command && is_error(name))
     {
         return Err(Error::input(format_args!(
-            "--column {text}: a {role} is not measured in {}; correct the unit",
-            unit.quantity.unit()
+            "--column {text}: a {role} is not measured in {}; {}",
+            unit.quantity.unit(),
+            if role == Role::Command { NO_COMMAND } else { "correct the unit" }
         )));
     }
     Ok(Choice { role, name: name.to_owned(), unit })
 }
 
+/// Reads one `--clock ROLE=NAME[:UNIT]`.
+pub fn clock_choice(text: &str) -> Result<Choice, Error> {
+    let refused =
+        |why: String| Error::input(format_args!("--clock {text}: {why}; give it as --clock command=t1:ms"));
+    let said = choice(text).or_else(|cause| match text.rsplit_once(':') {
+        Some((before, unit)) if units::parse(unit).is_some() => choice(before),
+        _ => Err(cause),
+    })?;
+    let unit = text.rsplit_once(':').and_then(|(_, unit)| units::parse(unit));
+    if unit.is_some_and(|unit| unit.quantity != units::Quantity::Time) || said.role == Role::Time {
+        return Err(refused("a clock of a role other than time, in s, ms, us or ns, is wanted".into()));
+    }
+    Ok(Choice { unit, ..said })
+}
+
+/// The column with the clock that a person gave a role, with its unit.
+pub(super) fn clock_of(
+    logs: &[Log],
+    clocks: &[Choice],
+    role: Role,
+) -> Result<Option<(Place, Option<Unit>)>, Error> {
+    let Some(said) = clocks.iter().find(|c| c.role == role) else { return Ok(None) };
+    let (at, _) = said.column(logs).ok_or_else(|| nowhere(said, logs))?;
+    Ok(Some((at, said.unit.or(logs[at.0].tables[at.1].columns[at.2].unit))))
+}
+
 /// Index of a log, of a table in it and of a column there.
-type Place = (usize, usize, usize);
+pub(super) type Place = (usize, usize, usize);
 
 /// A column that was chosen, with what is to be done to it.
 #[derive(Clone, Debug)]
@@ -84,79 +116,10 @@ pub(super) struct Chosen {
     pub sign: f64,
 }
 
-/// The words of a column's own name: of a path, as structures and topics have them, the last part.
-fn own_words(column: &Column) -> Vec<String> {
-    column.plain.rsplit(['.', '/']).next().map(units::words).unwrap_or_default()
-}
-
-/// A role that a name suggests, and how good a match it is: 0 is the best.
-fn suggested(column: &Column) -> Option<(Role, u32)> {
-    let words = units::words(&column.plain);
-    let has = |list: &str| words.iter().any(|word| list.split(' ').any(|known| known == word));
-    let own = own_words(column);
-    let is = |list: &str| own.len() == 1 && list.split(' ').any(|known| known == own[0]);
-    if has("error err std var variance acceleration acc accel ddot qdd ddq temperature temp index") {
-        return None;
-    }
-    let effort = has("torque tau effort current iq strom voltage volt volts pwm duty moment") || is("i");
-    let position =
-        has("position pos angle theta phi q x enc encoder count counts ticks weg winkel travel displacement");
-    let velocity = has("velocity vel speed omega rpm dot qd dq v w geschwindigkeit drehzahl");
-    let wanted = has("reference ref setpoint set target desired des demand demanded goal action soll");
-    let ordered = has("command cmd commanded ctrl control input u");
-    let measured = u32::from(has("measured meas actual act feedback fbk ist estimated est"));
-    if column.unit.is_some_and(|u| u.quantity == Quantity::Time) && !position && !effort {
-        return Some((Role::Time, if is("log_time") || words == ["log", "time"] { 3 } else { 0 }));
-    }
-    if is("t time timestamp stamp zeit seconds sec millis micros elapsed") || words == ["time", "s"] {
-        return Some((Role::Time, 0));
-    }
-    if words.last().is_some_and(|w| ["time", "timestamp", "stamp"].contains(&w.as_str())) {
-        return Some((Role::Time, 1));
-    }
-    let of_motion = column.unit.map(|u| u.quantity);
-    if (wanted || ordered) && velocity && !position && !effort {
-        return None;
-    }
-    if effort && (wanted || ordered) {
-        return Some((Role::Command, 1));
-    }
-    if (wanted || (ordered && !is("u")))
-        && (position || matches!(of_motion, Some(Quantity::Angle | Quantity::Length | Quantity::Counts)))
-    {
-        return Some((Role::Reference, 1));
-    }
-    if wanted && !effort {
-        return Some((Role::Reference, 2));
-    }
-    if velocity && !effort || matches!(of_motion, Some(Quantity::AngularSpeed | Quantity::Speed)) {
-        return Some((Role::Velocity, 1 + measured));
-    }
-    if has("tilt inclination incline neigung") {
-        return Some((Role::Tilt, 1));
-    }
-    if ordered {
-        return Some((Role::Command, 0));
-    }
-    if has("force load external ext loadcell kraft last") {
-        return Some((Role::Force, 1));
-    }
-    if effort {
-        return Some((Role::Command, 2 + measured));
-    }
-    if position {
-        let exact = u32::from(!has("position pos"));
-        return Some((Role::Position, 1 + exact));
-    }
-    by_unit(of_motion?)
-}
-
-/// The role of a column whose name says nothing.
-fn by_unit(quantity: Quantity) -> Option<(Role, u32)> {
-    match quantity {
-        Quantity::Angle | Quantity::Length | Quantity::Counts => Some((Role::Position, 4)),
-        Quantity::Current | Quantity::Voltage => Some((Role::Command, 4)),
-        _ => None,
+impl Chosen {
+    /// The column itself.
+    pub(super) fn column<'a>(&self, logs: &'a [Log]) -> &'a Column {
+        &logs[self.at.0].tables[self.at.1].columns[self.at.2]
     }
 }
 
@@ -170,7 +133,7 @@ fn listed(logs: &[Log]) -> String {
     };
     let of_log = |l: usize| {
         let mut names: Vec<String> = columns(logs)
-            .filter(|((log, ..), c)| *log == l && !c.name.is_empty())
+            .filter(|((log, ..), c)| *log == l && !c.name.is_empty() && c.has_numbers())
             .map(|(place, c)| in_words(place, c))
             .collect();
         names.dedup();
@@ -274,61 +237,118 @@ pub(super) fn check(logs: &[Log], choices: &[Choice]) -> Result<(), Error> {
 }
 
 /// The column of a role: the one that was said, else the one whose name fits best; an error where
-/// two fit alike.
-pub(super) fn choose(logs: &[Log], role: Role, choices: &[Choice]) -> Result<Option<Chosen>, Error> {
-    let files: Vec<&str> = logs.iter().map(|l| l.file.as_str()).collect();
-    let unit_of = |at: Place| logs[at.0].tables[at.1].columns[at.2].unit;
+/// several fit alike. A column of another axis than that at `motion` does not fit.
+pub(super) fn choose(
+    logs: &[Log],
+    role: Role,
+    choices: &[Choice],
+    motion: Option<Place>,
+) -> Result<Option<Chosen>, Error> {
     if let Some(said) = choices.iter().find(|c| c.role == role) {
-        if said.is_none(logs) {
-            return Ok(None);
-        }
-        let (at, sign) = said.column(logs).ok_or_else(|| nowhere(&files, said, logs))?;
-        let named = &logs[at.0].tables[at.1].columns[at.2].name;
-        if said.name.trim_start_matches('-') == named && is_repeated(logs, at) {
-            return Err(Error::input(format_args!(
-                "{}: has several columns \"{named}\"; say which by its number, as in --column {role}={}; its columns are {}",
-                logs[at.0].file,
-                number(logs, at),
-                listed(logs)
-            )));
-        }
-        let unit = said.unit.or(unit_of(at).filter(|u| role.takes(u.quantity)));
-        return Ok(Some(Chosen { at, unit, sign }));
+        return chosen(logs, said);
     }
     let taken: Vec<_> = choices.iter().filter_map(|c| Some(c.column(logs)?.0)).collect();
     let mut fitting: Vec<_> = columns(logs)
-        .filter(|(at, _)| !taken.contains(at))
+        .filter(|(at, c)| !taken.contains(at) && c.has_numbers())
         .filter_map(|(at, c)| suggested(c).filter(|s| s.0 == role).map(|s| (s.1, at, c)))
+        .filter(|(_, _, c)| role != Role::Enabled || c.is_a_switch())
         .collect();
-    fitting.sort_by_key(|f| f.0);
+    if let Some((l, t, c)) = motion.filter(|_| fitting.len() > 1 || role != Role::Time) {
+        let axes = Axes::new(columns(logs).map(|(_, c)| c));
+        let moved = &logs[l].tables[t].columns[c];
+        fitting.retain(|(_, _, c)| !axes.differ(c, moved));
+    }
+    // A cycle's length is no clock.
+    fitting.sort_by_key(|f| (role == Role::Time && !f.2.rises(), f.0));
+    let best = fitting.partition_point(|f| f.0 == fitting[0].0);
     match &fitting[..] {
         [] => Ok(None),
-        [a, b, ..] if a.0 == b.0 && role != Role::Time && role != Role::Velocity => {
+        [_, _, ..] if best > 1 && role != Role::Time && role != Role::Velocity => {
             // What may be left out is not worth a question.
-            if matches!(role, Role::Reference | Role::Tilt | Role::Force) {
+            if !matches!(role, Role::Command | Role::Position) {
                 return Ok(None);
             }
+            let names: Vec<&str> = fitting[..best].iter().map(|f| f.2.name.as_str()).collect();
+            let (last, others) = names.split_last().unwrap_or((&"", &[]));
             Err(Error::input(format_args!(
-                "{}: {} and {} could both be the {role}; say which with {}",
-                files.join(", "),
-                a.2.name,
-                b.2.name,
-                option(role, &handle(logs, a.1), None)
+                "{}: {} and {last} could {} be the {role}; say which with {}",
+                files(logs),
+                others.join(", "),
+                if best > 2 { "all" } else { "both" },
+                option(role, &handle(logs, fitting[0].1), None)
             )))
         }
-        [first, ..] => {
-            Ok(Some(Chosen { at: first.1, unit: first.2.unit.filter(|u| role.takes(u.quantity)), sign: 1.0 }))
-        }
+        [first, ..] => Ok(Some(Chosen { at: first.1, unit: first.2.unit, sign: 1.0 })),
     }
+}
+
+/// The column that a person named.
+fn chosen(logs: &[Log], said: &Choice) -> Result<Option<Chosen>, Error> {
+    let role = said.role;
+    if said.is_none(logs) {
+        return Ok(None);
+    }
+    let (at, sign) = said.column(logs).ok_or_else(|| nowhere(said, logs))?;
+    let column = &logs[at.0].tables[at.1].columns[at.2];
+    if said.name.trim_start_matches('-') == column.name && is_repeated(logs, at) {
+        return Err(Error::input(format_args!(
+            "{}: has several columns \"{}\"; say which by its number, as in --column {role}={}; its columns are {}",
+            logs[at.0].file,
+            column.name,
+            number(logs, at),
+            listed(logs)
+        )));
+    }
+    if !column.has_numbers() {
+        let (first, line, _) = column.unread.clone().unwrap_or_default();
+        return Err(Error::input(format_args!(
+            "{}: {} has no number (\"{first}\" in line {line}); choose another column for the {role}",
+            logs[at.0].file, column.name
+        )));
+    }
+    let is_of_motion = matches!(
+        suggested(column),
+        Some((Role::Position | Role::Reference | Role::Velocity | Role::Time, _))
+    );
+    if role == Role::Command && said.unit.is_none() && is_of_motion && column.is_named {
+        return Err(Error::input(format_args!(
+            "{}: {} seems to be a position, a speed or a time; {NO_COMMAND}, and {} takes it as it is",
+            logs[at.0].file,
+            column.name,
+            option(role, &said.name, Some("A"))
+        )));
+    }
+    let fits = |unit: &Unit| role.takes(unit.quantity) || role == Role::Command && is_error(&column.name);
+    let unit = said.unit.or(column.unit.filter(fits));
+    Ok(Some(Chosen { at, unit, sign }))
+}
+
+/// An error that a command follows the position as its target does.
+pub(super) fn is_a_target(logs: &[Log], command: &Chosen) -> Error {
+    let name = &command.column(logs).name;
+    Error::input(format_args!(
+        "{name} follows the position as its target does, so that it is hardly the command; give {} --error-as-command where a position loop ran, or {} if it is right",
+        option(Role::Reference, name, None),
+        option(Role::Command, name, Some("A"))
+    ))
+}
+
+fn files(logs: &[Log]) -> String {
+    logs.iter().map(|l| l.file.as_str()).collect::<Vec<_>>().join(", ")
 }
 
 /// `--column ROLE=NAME[:UNIT]`, quoted for a shell where it has to be.
 pub(super) fn option(role: Role, name: &str, unit: Option<&str>) -> String {
     let unit = unit.map_or(String::new(), |unit| format!(":{unit}"));
-    format!("--column {}", quoted(&format!("{role}={name}{unit}")))
+    option_of("--column", role, &format!("{name}{unit}"))
 }
 
-fn nowhere(files: &[&str], choice: &Choice, logs: &[Log]) -> Error {
+/// `OPTION ROLE=VALUE`, quoted for a shell where it has to be.
+pub(super) fn option_of(name: &str, role: Role, value: &str) -> String {
+    format!("{name} {}", quoted(&format!("{role}={value}")))
+}
+
+fn nowhere(choice: &Choice, logs: &[Log]) -> Error {
     let name = choice.name.trim_start_matches('-');
     let unit = match name.rsplit_once(':') {
         Some((_, unit)) => format!(
@@ -338,17 +358,22 @@ fn nowhere(files: &[&str], choice: &Choice, logs: &[Log]) -> Error {
     };
     Error::input(format_args!(
         "{}: has no column \"{name}\"; its columns are {}{unit}",
-        files.join(", "),
+        files(logs),
         listed(logs)
     ))
 }
 
 /// Which role could not be filled, with what there is.
 pub(super) fn missing(logs: &[Log], role: Role) -> Error {
-    let files: Vec<&str> = logs.iter().map(|l| l.file.as_str()).collect();
+    let unread = columns(logs).find(|(_, c)| !c.has_numbers() && suggested(c).is_some_and(|s| s.0 == role));
+    let unread = unread.and_then(|(_, c)| {
+        let (first, line, _) = c.unread.as_ref()?;
+        Some(format!(" ({} is not read as numbers: \"{first}\" in line {line})", c.name))
+    });
     Error::input(format_args!(
-        "{}: no column is known to be the {role}; say which with --column {role}=NAME[:UNIT]; its columns are {}",
-        files.join(", "),
+        "{}: no column is known to be the {role}{}; say which with --column {role}=NAME[:UNIT]; its columns are {}",
+        files(logs),
+        unread.unwrap_or_default(),
         listed(logs)
     ))
 }

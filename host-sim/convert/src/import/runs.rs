@@ -1,8 +1,9 @@
 //! Rows made fit for the contract: a clock that rises, no holes, no wraps, no minutes at rest.
 //! Whatever is changed or left out is said.
 
+use super::readings;
 use super::role::Role;
-use super::rows::{Rows, median_step};
+use super::rows::{Rows, median_step, pick, slice};
 use super::units::Quantity;
 use std::f64::consts::TAU;
 
@@ -13,6 +14,8 @@ pub struct Keep {
     pub idle: bool,
     /// Positions that jump by a turn.
     pub wraps: bool,
+    /// Rows that jump away and back.
+    pub outliers: bool,
 }
 
 /// A step of the clock this many times the usual one is a gap, if it is also this long, s.
@@ -24,15 +27,6 @@ const LONGEST_REST_S: f64 = 10.0;
 /// The shortest run that is worth a file.
 const SHORTEST_S: f64 = 1.0;
 const FEWEST_ROWS: usize = 20;
-
-fn pick(rows: &Rows, keep: impl Fn(usize) -> bool) -> Rows {
-    let of = |column: &[f64]| column.iter().enumerate().filter(|(i, _)| keep(*i)).map(|(_, x)| *x).collect();
-    Rows { time: of(&rows.time), columns: rows.columns.iter().map(|(r, c)| (*r, of(c))).collect(), ..*rows }
-}
-
-fn slice(rows: &Rows, from: usize, to: usize) -> Rows {
-    pick(rows, |i| (from..to).contains(&i))
-}
 
 /// Returns the column that gives the motion.
 fn motion(rows: &Rows) -> Role {
@@ -48,15 +42,26 @@ pub(super) fn runs(
 ) -> Vec<Rows> {
     let rows = complete(rows, notes);
     let mut out = Vec::new();
-    for run in restarts(rows, notes) {
+    let whole = restarts(rows, notes);
+    let enabled: Vec<Rows> = whole.into_iter().flat_map(|run| while_enabled(run, notes)).collect();
+    for run in enabled {
         let run = even_clock(run, notes);
         for mut run in gaps(run, notes) {
             if !keep.wraps {
-                unwrap(&mut run, counts_per_turn, notes);
+                unwrap(&mut run, counts_per_turn, true, notes);
+            }
+            if !keep.outliers {
+                run = readings::without_outliers(run, notes);
+            }
+            if !keep.wraps {
+                unwrap(&mut run, counts_per_turn, false, notes);
             }
             integrate(&mut run, notes);
-            let pieces = if keep.idle { vec![run] } else { without_rest(run, notes) };
-            out.extend(pieces);
+            let cut = if keep.outliers { vec![run] } else { readings::cut_at_resets(run, notes) };
+            for run in cut {
+                let pieces = if keep.idle { vec![run] } else { without_rest(run, notes) };
+                out.extend(pieces);
+            }
         }
     }
     let worth = |run: &Rows| {
@@ -77,34 +82,57 @@ pub(super) fn runs(
     out
 }
 
-/// Rows with a time and a motion; other columns hold their last value where one is missing.
+/// Rows with every column that drives; others hold their last value where one is missing. A command
+/// that is missing for long leaves a gap, at which the run is cut.
 fn complete(rows: Rows, notes: &mut Vec<String>) -> Rows {
-    let motion = rows.columns[&motion(&rows)].clone();
-    let bad = |i: usize| !rows.time[i].is_finite() || !motion[i].is_finite();
-    let count = (0..rows.time.len()).filter(|i| bad(*i)).count();
-    if count > 0 {
-        notes.push(format!("{count} rows without a time or a position left out"));
-    }
-    let mut rows = pick(&rows, |i| !bad(i));
     let mut begin = 0;
+    let mut missing = vec![false; rows.time.len()];
+    let mut rows = rows;
     for (role, column) in &mut rows.columns {
-        let mut filled = 0;
-        for i in 1..column.len() {
-            if !column[i].is_finite() && column[i - 1].is_finite() {
-                column[i] = column[i - 1];
-                filled += 1;
-            }
-        }
-        if filled > 0 {
-            notes.push(format!("{filled} rows had no {role}: the value before holds there"));
-        }
         let first = column.iter().position(|x| x.is_finite()).unwrap_or(column.len());
         begin = begin.max(first);
+        let drives = matches!(role, Role::Command | Role::Force);
+        let mut holes = Vec::new();
+        for i in first.max(1)..column.len() {
+            if !column[i].is_finite() && drives {
+                missing[i] = true;
+                if column[i - 1].is_finite() {
+                    holes.push(i);
+                }
+            } else if !column[i].is_finite() {
+                column[i] = column[i - 1];
+            }
+        }
+        if let Some(at) = holes.first() {
+            notes.push(format!(
+                "there is no {role} for long {} times, first from {:.3} s on: cut there",
+                holes.len(),
+                rows.time[*at] - rows.time[0]
+            ));
+        }
     }
     if begin > 0 {
         notes.push(format!("{begin} rows before the first value of every column left out"));
     }
-    slice(&rows, begin, rows.time.len())
+    pick(&rows, |i| i >= begin && !missing[i])
+}
+
+/// The stretches in which the drive was on.
+fn while_enabled(run: Rows, notes: &mut Vec<String>) -> Vec<Rows> {
+    let Some(on) =
+        run.columns.get(&Role::Enabled).map(|column| column.iter().map(|x| *x != 0.0).collect::<Vec<_>>())
+    else {
+        return vec![run];
+    };
+    let off = on.iter().filter(|on| !**on).count();
+    if off == 0 {
+        return vec![run];
+    }
+    notes.push(format!("{off} rows with the drive off left out, and cut there"));
+    let mut cuts: Vec<usize> = (1..on.len()).filter(|i| on[*i] != on[i - 1]).collect();
+    cuts.insert(0, 0);
+    cuts.push(on.len());
+    cuts.windows(2).filter(|w| on[w[0]]).map(|w| slice(&run, w[0], w[1])).collect()
 }
 
 /// A clock that falls back begins another run; rows a little out of order are left out.
@@ -192,27 +220,25 @@ fn gaps(run: Rows, notes: &mut Vec<String>) -> Vec<Rows> {
 }
 
 /// Takes the jumps of a turn, or of a counter that runs over, out of positions.
-fn unwrap(run: &mut Rows, counts_per_turn: Option<f64>, notes: &mut Vec<String>) {
+fn unwrap(run: &mut Rows, counts_per_turn: Option<f64>, is_known: bool, notes: &mut Vec<String>) {
+    let seen = run.columns.get(&Role::Position).filter(|_| !is_known).and_then(|column| seen_modulus(column));
     for (role, quantity) in [(Role::Position, run.position), (Role::Reference, run.reference)] {
         let Some(column) = run.columns.get_mut(&role) else { continue };
-        let (low, high) =
-            column.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)));
-        let moduli = match quantity {
+        let known = match quantity {
             Quantity::Angle => vec![TAU],
             Quantity::Counts => counts_per_turn.into_iter().chain([65536.0, 4_294_967_296.0]).collect(),
-            _ => continue,
+            _ => Vec::new(),
         };
-        let wraps = |m: f64| column.windows(2).filter(|w| (w[1] - w[0]).abs() > 0.6 * m).count();
-        let found =
-            moduli.into_iter().find(|m| high - low <= 1.002 * m && high - low > 0.8 * m && wraps(*m) > 0);
-        let Some(turn) = found else { continue };
-        let count = wraps(turn);
+        let known = if is_known { known } else { seen.into_iter().collect() };
+        let Some(turn) = known_modulus(column, &known) else { continue };
+        let mut count = 0;
         let (mut add, mut before) = (0.0, column[0]);
         for x in column.iter_mut() {
             let jump = *x - before;
             before = *x;
             if jump.abs() > 0.6 * turn {
                 add -= turn * jump.signum();
+                count += 1;
             }
             *x += add;
         }
@@ -220,6 +246,43 @@ fn unwrap(run: &mut Rows, counts_per_turn: Option<f64>, notes: &mut Vec<String>)
             "the {role} wraps {count} times, at {turn:.6}: made continuous; --keep-wraps leaves it"
         ));
     }
+}
+
+fn span(column: &[f64]) -> f64 {
+    let (low, high) =
+        column.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(*x), high.max(*x)));
+    high - low
+}
+
+fn known_modulus(column: &[f64], known: &[f64]) -> Option<f64> {
+    let span = span(column);
+    let wraps = |m: f64| column.windows(2).any(|w| (w[1] - w[0]).abs() > 0.6 * m);
+    known.iter().copied().find(|m| span <= 1.002 * m && span > 0.8 * m && wraps(*m))
+}
+
+/// The modulus of a column that jumps by nearly all of its range, each time by the same and against
+/// the way that it moves.
+fn seen_modulus(column: &[f64]) -> Option<f64> {
+    let span = span(column);
+    let jumps: Vec<usize> =
+        (2..column.len() - 1).filter(|i| (column[*i] - column[i - 1]).abs() > 0.8 * span).collect();
+    if jumps.len() < 2 {
+        return None;
+    }
+    let size = |i: &usize| {
+        let step = 0.5 * (column[i + 1] - column[*i] + column[i - 1] - column[i - 2]);
+        let jump = column[*i] - column[i - 1];
+        (jump.abs() - step * jump.signum(), -step * jump.signum())
+    };
+    let sizes: Vec<(f64, f64)> = jumps.iter().map(size).collect();
+    let mean = sizes.iter().map(|s| s.0).sum::<f64>() / sizes.len() as f64;
+    let step = sizes.iter().map(|s| s.1).fold(0.0, f64::max);
+    let agree = sizes.iter().all(|(size, _)| (size - mean).abs() < (0.3 * step).max(0.005 * span));
+    let small =
+        column.windows(2).filter(|w| (0.3 * span..=0.8 * span).contains(&(w[1] - w[0]).abs())).count();
+    let on = sizes.iter().filter(|s| s.1 > 0.0).count();
+    let moves_on = sizes.iter().all(|s| s.1 >= 0.0) && 2 * on > sizes.len();
+    (agree && moves_on && small == 0 && step < 0.2 * span && mean > 0.98 * span).then_some(mean)
 }
 
 /// Positions from speeds where only those were recorded, by the trapezoidal rule.

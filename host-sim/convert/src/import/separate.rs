@@ -15,7 +15,7 @@ const RUNS: &str = "fit holdout train training test val valid validation verify 
                     rep repeat exp experiment session rec recording log slow slower fast faster \
                     day night before after first second third one two three monday tuesday wednesday thursday friday";
 /// Words for parts of a machine: a number after one of them is no number of a run.
-const PARTS: &str =
+pub(super) const PARTS: &str =
     "joint joints motor axis axes sensor channel ch encoder drive actuator wheel leg arm finger side";
 /// Letters for axes of a machine.
 const AXES: [&str; 3] = ["x", "y", "z"];
@@ -94,7 +94,7 @@ fn only_in<'a>(a: &'a [String], b: &'a [String]) -> impl Iterator<Item = (Option
 }
 
 /// `run12b` as `run`, `12`, `b`.
-fn numbers_apart(word: &str) -> Vec<String> {
+pub(super) fn numbers_apart(word: &str) -> Vec<String> {
     let mut out: Vec<String> = Vec::new();
     let mut before = None;
     for c in word.chars() {

@@ -1,16 +1,15 @@
 //! Tables as text: any separator, decimal point or comma, comments, preambles, a row of units,
 //! dates, no header at all.
 
+use super::header::{self, Above};
+use super::layout::{self, Layout, Lines, SEPARATORS, sample};
+use super::numbers::{self, Decimal, is_missing};
+use super::stamps;
 use super::table::{Column, ColumnTable, Log};
 use super::units;
 use device_sim::error::Error;
 
-const SEPARATORS: [(char, &str); 5] =
-    [(';', "semicolons"), ('\t', "tabs"), (',', "commas"), ('|', "bars"), (' ', "spaces")];
 const COMMENTS: [&str; 4] = ["#", "%", "//", "!"];
-/// The number of lines from which the layout is recognised.
-const SAMPLE: usize = 200;
-
 /// Text from bytes: UTF-8, UTF-16 with its mark, else Latin-1, which German and French instruments
 /// write.
 pub(super) fn decode(bytes: &[u8]) -> String {
@@ -29,138 +28,87 @@ pub(super) fn decode(bytes: &[u8]) -> String {
     text.trim_start_matches('\u{feff}').to_owned()
 }
 
-/// A number, or a date as seconds; none where it is neither.
-fn number(field: &str, separator: char) -> Option<f64> {
-    let field = field.trim().trim_matches('"').trim();
-    if let Ok(value) = field.parse() {
-        return Some(value);
-    }
-    if separator != ',' && field.contains(',') && !field.contains('.') {
-        return field.replace(',', ".").parse().ok();
-    }
-    match field {
-        "true" | "True" | "TRUE" => Some(1.0),
-        "false" | "False" | "FALSE" => Some(0.0),
-        _ => date(field),
-    }
-}
+/// Fields that are looked at for the sign before decimals.
+const MOST_FIELDS: usize = 200_000;
 
-/// Seconds of a date with a time, or of a time of day.
-fn date(field: &str) -> Option<f64> {
-    if !field.contains(':') || !field.starts_with(|c: char| c.is_ascii_digit()) {
-        return None;
-    }
-    if let Ok(stamp) = field.parse::<jiff::Timestamp>() {
-        return Some(stamp.as_second() as f64 + f64::from(stamp.subsec_nanosecond()) * 1e-9);
-    }
-    let day = |d: jiff::civil::Date| d.duration_since(jiff::civil::date(1970, 1, 1)).as_secs_f64();
-    let clock = |t: jiff::civil::Time| t.duration_since(jiff::civil::Time::midnight()).as_secs_f64();
-    if let Ok(at) = field.parse::<jiff::civil::DateTime>() {
-        return Some(day(at.date()) + clock(at.time()));
-    }
-    field.parse().ok().map(clock)
-}
-
-fn fields(line: &str, separator: char) -> Vec<&str> {
-    if separator == ' ' {
-        return line.split_whitespace().collect();
-    }
-    let mut out = Vec::new();
-    let (mut from, mut quoted) = (0, false);
-    for (at, c) in line.char_indices() {
-        if c == '"' {
-            quoted = !quoted;
-        } else if c == separator && !quoted {
-            out.push(&line[from..at]);
-            from = at + c.len_utf8();
-        }
-    }
-    out.push(&line[from..]);
-    out
-}
-
-/// The layout of a text.
-struct Layout {
-    separator: char,
-    count: usize,
-}
-
-/// The separator under which most fields of the sample are numbers, of as many columns as the most
-/// lines have.
-fn layout(lines: &[(usize, &str)]) -> Layout {
-    let from = lines.len().saturating_sub(SAMPLE);
-    let sample = &lines[from..];
-    let mut best = (Layout { separator: ',', count: 1 }, 0.0);
-    for (separator, _) in SEPARATORS {
-        let split: Vec<Vec<&str>> = sample.iter().map(|(_, line)| fields(line, separator)).collect();
-        let mut counts: Vec<usize> = split.iter().map(Vec::len).collect();
-        counts.sort_unstable();
-        let count = counts.get(counts.len() / 2).copied().unwrap_or(1);
-        if count < 2 {
-            continue;
-        }
-        let alike = split.iter().filter(|f| f.len() == count);
-        let (mut good, mut all) = (0, 0);
-        for row in alike {
-            all += count;
-            good += row.iter().filter(|f| number(f, separator).is_some() || f.trim().is_empty()).count();
-        }
-        let share = good as f64 / (sample.len() * count).max(1) as f64 + 1e-9 * all as f64;
-        if share > best.1 + 1e-6 {
-            best = (Layout { separator, count }, share);
-        }
-    }
-    best.0
-}
-
-/// Reads a text file.
-pub(super) fn read(file: &str, bytes: &[u8]) -> Result<Log, Error> {
+/// Reads a text file; `decimal` is what a person said of the sign before decimals.
+pub(super) fn read(file: &str, bytes: &[u8], decimal: Option<Decimal>) -> Result<Log, Error> {
     let text = decode(bytes);
     let (lines, comments) = lines_and_comments(&text);
-    let Layout { separator, count } = layout(&lines);
-    if let Some(log) = channels_in_rows(file, &lines, separator, count) {
+    let mut layout = layout::layout(&lines);
+    if layout.separator == ',' {
+        layout.join_stamps(&lines);
+    }
+    let every = lines.len() * layout.count / MOST_FIELDS + 1;
+    let fields = lines.iter().step_by(every).flat_map(|(_, line)| layout.fields(line));
+    layout.decimal = match decimal {
+        Some(decimal) => decimal,
+        None => numbers::decimal(file, fields)?,
+    };
+    if let Some(log) = channels_in_rows(file, &lines, layout) {
         return Ok(log);
     }
-    let numeric = |line: &str| {
-        let row = fields(line, separator);
-        let numbers = row.iter().filter(|f| number(f, separator).is_some()).count();
-        row.len() == count && 2 * numbers >= count.max(1) && numbers > 0
-    };
-    let Some(first) = lines.iter().position(|(_, line)| numeric(line)) else {
+    let Some(first) = first_row(&lines, layout) else {
         return Err(Error::input(format_args!(
             "{file}: no row of numbers was found; give a table as text, .npz, JSON, MCAP or Parquet"
         )));
     };
     let mut notes = Vec::new();
-    let names = header(&lines[..first], &comments, first, separator, count, &mut notes);
-    let named = SEPARATORS.iter().find(|s| s.0 == separator).map_or("", |s| s.1);
+    let above = Above { lines: &lines[..first], comments: &comments };
+    let names = header::names(above, layout, &mut notes);
+    let named = SEPARATORS.iter().find(|s| s.0 == layout.separator).map_or("", |s| s.1);
     notes.push(format!(
-        "read as text: {count} columns between {named}{}{}",
-        if decimal_comma(&lines[first..], separator) { ", decimal commas" } else { "" },
+        "read as text: {} columns between {named}{}{}",
+        layout.count,
+        if layout.decimal == Decimal::Comma { ", decimal commas" } else { "" },
         if comments.is_empty() {
             String::new()
         } else {
             format!(", {} comment lines left out", comments.len())
         }
     ));
+    let row = layout.fields(lines[first].1);
+    let is_stamp = |i: usize| stamps::seconds(row[i].trim().trim_matches('"')).is_some();
     let columns = names
         .into_iter()
-        .zip(values(&lines[first..], separator, count, &mut notes))
+        .zip(values(&lines[first..], layout, &mut notes))
         .enumerate()
-        .map(|(i, ((name, unit), values))| {
+        .map(|(i, ((name, unit), (values, unread)))| {
             let mut column = match name {
                 Some(name) => Column::new(name, values),
                 None => Column::unnamed(format!("column{}", i + 1), values),
             };
-            column.unit = unit.or(column.unit);
+            column.set_unit(unit);
+            if is_stamp(i) {
+                column.set_unit(units::written("s"));
+            }
+            column.unread = unread;
             column
         })
         .collect();
     Ok(Log { file: file.to_owned(), tables: vec![ColumnTable { name: file.to_owned(), columns }], notes })
 }
 
-/// Lines, each with a number.
-type Lines<'a> = Vec<(usize, &'a str)>;
+/// The first line of numbers: each field is a number where most of its column are numbers.
+fn first_row(lines: &Lines, layout: Layout) -> Option<usize> {
+    let mut numbers = vec![(0, 0); layout.count];
+    for row in sample(lines).map(|line| layout.fields(line)).filter(|row| row.len() == layout.count) {
+        for (field, (good, all)) in row.iter().zip(&mut numbers).filter(|(field, _)| !is_missing(field)) {
+            *good += usize::from(layout.number(field).is_some());
+            *all += 1;
+        }
+    }
+    let is_row = |(_, line): &(usize, &str)| {
+        let row = layout.fields(line);
+        let fits = |(field, (good, all)): (&&str, &(usize, usize))| {
+            is_missing(field) || layout.number(field).is_some() || 5 * good < 4 * all
+        };
+        row.len() == layout.count
+            && row.iter().any(|field| layout.number(field).is_some())
+            && row.iter().zip(&numbers).all(fits)
+    };
+    lines.iter().position(is_row)
+}
 
 /// Lines with their numbers from 1, and comments with the count of lines before them; empty ones
 /// are left out.
@@ -179,27 +127,36 @@ fn lines_and_comments(text: &str) -> (Lines<'_>, Lines<'_>) {
     (lines, comments)
 }
 
-/// The numbers of each column; lines of another number of fields or without a number are left out,
+/// The numbers of a column, and the first value that is not a number, its line, and how many there are.
+type Values = (Vec<f64>, Option<(String, usize, usize)>);
+
+/// The values of each column; lines of another number of fields or without a number are left out,
 /// with a note.
-fn values(lines: &[(usize, &str)], separator: char, count: usize, notes: &mut Vec<String>) -> Vec<Vec<f64>> {
-    let mut columns: Vec<Vec<f64>> = vec![Vec::with_capacity(lines.len()); count];
-    let (mut ragged, mut first_ragged) = (0, 0);
+fn values(lines: &[(usize, &str)], layout: Layout, notes: &mut Vec<String>) -> Vec<Values> {
+    let mut columns: Vec<Values> = vec![(Vec::with_capacity(lines.len()), None); layout.count];
+    let (mut ragged, mut first_ragged) = (0, (0, ""));
     for (at, line) in lines {
-        let row = fields(line, separator);
-        if row.len() != count || row.iter().all(|f| number(f, separator).is_none()) {
+        let row = layout.fields(line);
+        if row.len() != layout.count || row.iter().all(|f| layout.number(f).is_none()) {
             if ragged == 0 {
-                first_ragged = *at;
+                first_ragged = (*at, *line);
             }
             ragged += 1;
             continue;
         }
-        for (column, field) in columns.iter_mut().zip(&row) {
-            column.push(number(field, separator).unwrap_or(f64::NAN));
+        for ((values, unread), field) in columns.iter_mut().zip(&row) {
+            let number = layout.number(field);
+            if number.is_none() && !is_missing(field) {
+                unread.get_or_insert_with(|| (field.trim().chars().take(40).collect(), *at, 0)).2 += 1;
+            }
+            values.push(number.unwrap_or(f64::NAN));
         }
     }
     if ragged > 0 {
+        let shown: String = first_ragged.1.chars().take(40).collect();
         notes.push(format!(
-            "{ragged} lines without {count} fields or without a number left out, the first at line {first_ragged}"
+            "{ragged} lines without {} fields or without a number left out, the first at line {} (\"{shown}\")",
+            layout.count, first_ragged.0
         ));
     }
     columns
@@ -212,17 +169,17 @@ const LONGER_THAN_MANY: usize = 8;
 
 /// A table whose rows are the channels, each with its name, and perhaps its unit, before its
 /// values.
-fn channels_in_rows(file: &str, lines: &[(usize, &str)], separator: char, count: usize) -> Option<Log> {
+fn channels_in_rows(file: &str, lines: &Lines, layout: Layout) -> Option<Log> {
+    let count = layout.count;
     if lines.len() > MOST_CHANNELS || count < LONGER_THAN_MANY * lines.len().max(4) {
         return None;
     }
     let mut columns = Vec::new();
     for (_, line) in lines {
         let row: Vec<&str> =
-            fields(line, separator).into_iter().map(|f| f.trim().trim_matches('"').trim()).collect();
-        let words = row.iter().take_while(|f| number(f, separator).is_none()).count();
-        let values: Vec<f64> =
-            row[words..].iter().map(|f| number(f, separator).unwrap_or(f64::NAN)).collect();
+            layout.fields(line).into_iter().map(|f| f.trim().trim_matches('"').trim()).collect();
+        let words = row.iter().take_while(|f| layout.number(f).is_none()).count();
+        let values: Vec<f64> = row[words..].iter().map(|f| layout.number(f).unwrap_or(f64::NAN)).collect();
         let numbers = values.iter().filter(|x| x.is_finite()).count();
         if words > 3 || 2 * numbers < count {
             continue;
@@ -231,7 +188,7 @@ fn channels_in_rows(file: &str, lines: &[(usize, &str)], separator: char, count:
             Some(name) => Column::new(*name, values),
             None => Column::unnamed(format!("column{}", columns.len() + 1), values),
         };
-        column.unit = row[..words].iter().skip(1).find_map(|f| units::parse(f)).or(column.unit);
+        column.set_unit(row[..words].iter().skip(1).find_map(|f| units::written(f)));
         columns.push(column);
     }
     (columns.len() >= 2).then(|| {
@@ -242,56 +199,4 @@ fn channels_in_rows(file: &str, lines: &[(usize, &str)], separator: char, count:
         );
         Log { notes: vec![note], ..Log::of_columns(file, columns) }
     })
-}
-
-fn decimal_comma(lines: &[(usize, &str)], separator: char) -> bool {
-    separator != ',' && lines.iter().take(SAMPLE).any(|(_, line)| line.contains(','))
-}
-
-/// Names, none where they are made up, and units of their own.
-type Names = Vec<(Option<String>, Option<units::Unit>)>;
-
-/// The names of the columns with the units of a row of their own: from the lines above the numbers,
-/// else from the last comment of as many words, else made up.
-fn header(
-    above: &[(usize, &str)],
-    comments: &[(usize, &str)],
-    first: usize,
-    separator: char,
-    count: usize,
-    notes: &mut Vec<String>,
-) -> Names {
-    let fitting = |line: &str| -> Option<Vec<String>> {
-        let mut row: Vec<String> =
-            fields(line, separator).iter().map(|f| f.trim().trim_matches('"').trim().to_owned()).collect();
-        // A separator at the end of the rows of numbers only.
-        if row.len() + 1 == count {
-            row.push(String::new());
-        }
-        (row.len() == count).then_some(row)
-    };
-    let rows: Vec<Vec<String>> = above.iter().rev().map_while(|(_, line)| fitting(line)).collect();
-    let is_units = |row: &[String]| {
-        row.iter().any(|f| units::parse(f).is_some())
-            && row.iter().all(|f| f.is_empty() || units::parse(f).is_some())
-    };
-    let (names, own_units, used) = match &rows[..] {
-        [below, names, ..] if is_units(below) => (Some(names.clone()), Some(below.clone()), 2),
-        [names, ..] => (Some(names.clone()), None, 1),
-        [] => (None, None, 0),
-    };
-    if above.len() > used {
-        notes.push(format!("{} lines above the header left out", above.len() - used));
-    }
-    let from_comment = || {
-        let (_, comment) = comments.iter().rev().find(|(before, _)| *before <= first)?;
-        let by_words: Vec<String> = comment.split_whitespace().map(str::to_owned).collect();
-        fitting(comment).or_else(|| (by_words.len() == count).then_some(by_words))
-    };
-    let Some(names) = names.or_else(from_comment) else {
-        notes.push(format!("no header: the columns are called column1 to column{count}"));
-        return vec![(None, None); count];
-    };
-    let unit_of = |i: usize| own_units.as_ref().and_then(|u| units::parse(&u[i]));
-    names.into_iter().enumerate().map(|(i, name)| (Some(name), unit_of(i))).collect()
 }

@@ -6,7 +6,9 @@ use super::role::Role;
 use super::rows::Rows;
 use super::units::Quantity;
 use crate::export::write;
+use crate::shell::quoted;
 use device_sim::error::Error;
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -118,27 +120,117 @@ fn csv(run: &Rows, scale: Scale, out: &mut impl std::io::Write) -> std::io::Resu
     Ok(())
 }
 
-/// Writes every run and, where `rig` has a text, `rig.toml`, into `dir`; the paths of the runs.
+/// Writes every run and, where `rig` has a text, `rig.toml`, into `dir`; the paths of the runs. What
+/// an earlier import wrote there is replaced, or removed, but never a file that somebody changed.
 pub(super) fn files(
     dir: &Path,
     rig: Option<&str>,
     runs: &[(String, Rows)],
     scale: Scale,
 ) -> Result<Vec<PathBuf>, Error> {
+    let paths: Vec<PathBuf> = runs.iter().map(|(name, _)| dir.join(format!("{name}.csv"))).collect();
+    let rig = rig.map(|text| (dir.join("rig.toml"), text));
+    let earlier = Written::read(dir);
+    for path in rig.iter().map(|(path, _)| path).chain(&paths) {
+        earlier.check(path)?;
+    }
     std::fs::create_dir_all(dir).map_err(|cause| {
         Error::input(format_args!(
             "{}: the folder cannot be made ({cause}); choose another --out",
             dir.display()
         ))
     })?;
-    if let Some(text) = rig {
-        write(&dir.join("rig.toml"), |out| out.write_all(text.as_bytes()))?;
+    let mut done = earlier;
+    if let Some((path, text)) = &rig {
+        write(path, |out| out.write_all(text.as_bytes()))?;
+        done.add(path)?;
     }
-    let mut paths = Vec::new();
-    for (name, run) in runs {
-        let path = dir.join(format!("{name}.csv"));
-        write(&path, |out| csv(run, scale, out))?;
-        paths.push(path);
+    for (path, (_, run)) in paths.iter().zip(runs) {
+        write(path, |out| csv(run, scale, out))?;
+        done.add(path)?;
     }
+    done.remove_all_but(&paths)?;
     Ok(paths)
+}
+
+/// The files that imports wrote into a folder, by name, with the sums of their contents.
+struct Written {
+    dir: PathBuf,
+    sums: BTreeMap<String, u64>,
+}
+
+impl Written {
+    const NAME: &str = ".import";
+
+    fn read(dir: &Path) -> Self {
+        let text = std::fs::read_to_string(dir.join(Self::NAME)).unwrap_or_default();
+        let line = |line: &str| {
+            let (sum, name) = line.split_once(' ')?;
+            Some((name.to_owned(), u64::from_str_radix(sum, 16).ok()?))
+        };
+        Self { dir: dir.to_owned(), sums: text.lines().filter_map(line).collect() }
+    }
+
+    fn write(&self) -> Result<(), Error> {
+        let text: String = self.sums.iter().map(|(name, sum)| format!("{sum:016x} {name}\n")).collect();
+        write(&self.dir.join(Self::NAME), |out| out.write_all(text.as_bytes()))
+    }
+
+    /// Notes a file that was written now.
+    fn add(&mut self, path: &Path) -> Result<(), Error> {
+        self.sums.extend(sum(path).map(|sum| (name(path), sum)));
+        self.write()
+    }
+
+    /// True if the file is as an import wrote it.
+    fn is_ours(&self, path: &Path) -> bool {
+        self.sums.get(&name(path)).is_some_and(|wrote| sum(path) == Some(*wrote))
+    }
+
+    /// Refuses to replace a file that somebody else wrote or changed.
+    fn check(&self, path: &Path) -> Result<(), Error> {
+        if !path.exists() || self.is_ours(path) {
+            return Ok(());
+        }
+        let keep = if path.ends_with("rig.toml") {
+            format!("keep it with --rig {}, remove it, ", quoted(&path.display().to_string()))
+        } else {
+            "remove it ".into()
+        };
+        Err(Error::input(format_args!(
+            "{}: is there already and not as import wrote it; {keep}or choose another --out",
+            path.display()
+        )))
+    }
+
+    /// Removes recordings that an earlier import wrote and this one did not.
+    fn remove_all_but(&mut self, new: &[PathBuf]) -> Result<(), Error> {
+        let old: Vec<PathBuf> = self.sums.keys().map(|name| self.dir.join(name)).collect();
+        for path in old.iter().filter(|path| !new.contains(path) && !path.ends_with("rig.toml")) {
+            if self.is_ours(path) && std::fs::remove_file(path).is_ok() {
+                self.sums.remove(&name(path));
+            }
+        }
+        self.write()
+    }
+}
+
+fn name(path: &Path) -> String {
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+/// A sum of a file's content (FNV-1a, which no accident meets); none where it cannot be read.
+fn sum(path: &Path) -> Option<u64> {
+    let add = |sum: u64, byte: u8| (sum ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3);
+    let mut reader = std::io::BufReader::with_capacity(1 << 16, std::fs::File::open(path).ok()?);
+    let mut total = 0xcbf2_9ce4_8422_2325;
+    loop {
+        let bytes = std::io::BufRead::fill_buf(&mut reader).ok()?;
+        if bytes.is_empty() {
+            return Some(total);
+        }
+        total = bytes.iter().fold(total, |sum, byte| add(sum, *byte));
+        let length = bytes.len();
+        std::io::BufRead::consume(&mut reader, length);
+    }
 }

@@ -21,6 +21,14 @@ const EVEN: f64 = 0.5;
 /// As many a second are enough for a curve with knots of a quarter of a mm.
 const MOST_HZ: f64 = 1_000.0;
 
+/// Larger than any force of a needle, N.
+const LARGEST_N: f64 = 60.0;
+/// A force at this distance from the skin or farther is the sensor's alone, mm.
+const REST_MM: f64 = 0.05;
+/// The largest of those, N and as a part of the forces inside.
+const REST_N: f64 = 0.2;
+const REST_PART: f64 = 0.15;
+
 /// A moment of a measurement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Moment {
@@ -61,6 +69,7 @@ pub fn read(path: &Path) -> Result<Vec<Insertion>, Error> {
         })?;
         vec![parse_csv(&shown, &text)?]
     };
+    series.iter().try_for_each(|moments| check_force(&shown, moments))?;
     let found: Vec<Insertion> = series
         .iter()
         .flat_map(|moments| ways_in(moments))
@@ -77,6 +86,35 @@ pub fn read(path: &Path) -> Result<Vec<Insertion>, Error> {
         )));
     }
     Ok(found)
+}
+
+/// Refuses a force that no needle meets: in another unit, with its sign turned, or with a zero that
+/// was not taken off.
+fn check_force(file: &str, moments: &[Moment]) -> Result<(), Error> {
+    let forces =
+        |inside: bool| moments.iter().filter(move |m| (m.depth_mm > 0.0) == inside).map(|m| m.force_n);
+    let outside = || moments.iter().filter(|m| m.depth_mm < -REST_MM).map(|m| m.force_n);
+    let rest = median(outside()).unwrap_or(0.0);
+    let (low, high) = forces(true).fold((0.0_f64, 0.0_f64), |(l, h), f| (l.min(f), h.max(f)));
+    let refused = |why: String| Err(Error::input(format_args!("{file}: {why}")));
+    if (high - rest).max(rest - low) > LARGEST_N {
+        let far = if high > -low { high } else { low };
+        return refused(format!(
+            "force_n reaches {far:.0}, more than any needle meets in N; if it is in mN, divide it by 1000"
+        ));
+    }
+    if rest.abs() > REST_N.max(REST_PART * (high - low)) {
+        return refused(format!(
+            "force_n is {rest:.2} N before the needle touches; subtract it from all rows"
+        ));
+    }
+    if median(forces(true)).is_some_and(|middle| middle < 0.0) && -low > 2.0 * high {
+        return refused(
+            "the force is negative throughout; force_n is positive against insertion, so turn its sign"
+                .into(),
+        );
+    }
+    Ok(())
 }
 
 fn from_recording(recording: &Recording) -> Vec<Vec<Moment>> {

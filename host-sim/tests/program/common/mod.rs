@@ -1,6 +1,7 @@
 //! The shared parts of the command line's tests: the program, a separate folder, its output.
 #![allow(dead_code, reason = "each test file uses some of it")]
 
+pub(crate) mod axis;
 pub(crate) mod paced;
 
 use std::path::{Path, PathBuf};
