@@ -1,7 +1,7 @@
 //! Gives the linker the board's memory map and the scripts that lay the image out. Here and not in
 //! `.cargo/config.toml`, where a `RUSTFLAGS` of the environment would silently replace them.
-//! Refuses an image for no board or for two, as the HAL does in its own words. Gives every image the
-//! commit that it is built from, however it is built.
+//! Refuses an image for no board or for two, as the HAL does in its own words. Gives every image
+//! the commit that it is built from, however it is built.
 
 use std::path::PathBuf;
 use std::process::Command;

@@ -86,8 +86,8 @@ impl Supervisor {
     }
 }
 
-/// What takes torque away at the next tick, on its way there from the tasks below it: a bit for
-/// each fault, and one for a stop.
+/// Faults and stops on their way from the tasks below to the tick, which takes torque away: a bit
+/// for each fault, and one for a stop.
 #[derive(Default)]
 pub struct Trips(AtomicU32);
 

@@ -111,8 +111,8 @@ pub const TILT_SPI_HZ: u32 = 1_500_000;
 /// The rate to ask the HAL for to get it: it takes the second bus to run as out of reset.
 pub const TILT_SPI_ASKED_HZ: u32 = (TILT_SPI_HZ as u64 * RESET_CLOCK_HZ as u64 / APB2_HZ as u64) as u32;
 
-/// After this time in a turn telemetry takes no further packet: 0.3 ms. The command under way may end
-/// 2 ms later.
+/// After this time in a turn telemetry takes no further packet: 0.3 ms. The command under way may
+/// end 2 ms later.
 pub(crate) const COMMAND_CYCLES: u32 = CORE_HZ / 3_300;
 
 /// Telemetry's share of a millisecond for a save: 0.4 ms. The word under way may end 0.2 ms later

@@ -53,7 +53,7 @@ impl Identity {
         Self { serial: [0; 12], firmware: [0, 1, 0], build: Build::CURRENT, ceilings: Ceilings::VIRTUAL };
 }
 
-/// What the control law has done beyond the samples that have arrived.
+/// The state of the control law beyond the samples that have arrived.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Ahead {
     /// The amplifier is on right now.
@@ -205,7 +205,7 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
     }
 
     /// Says what the control law has done beyond the samples that have arrived, from now on. Where
-    /// nothing lies between the two there is nothing to say.
+    /// there is no queue between the two there is nothing to say.
     pub fn set_ahead(&mut self, ahead: Ahead) {
         self.ahead = ahead;
     }

@@ -321,7 +321,7 @@ fn a_fault_is_reported_and_again_after_a_reconnection() {
 }
 
 #[test]
-fn a_fault_is_cleared_by_a_person_after_a_stop_and_by_nothing_else() {
+fn a_fault_is_cleared_only_by_clear_after_a_stop() {
     let mut bench = Bench::new();
     let _ = bench.send(Command::Hello { version: PROTOCOL_VERSION });
     assert_eq!(bench.send(Command::Clear), Ok(()), "there is none");

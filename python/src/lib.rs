@@ -108,8 +108,9 @@ fn import_recording(
     out: PathBuf,
     columns: Vec<String>,
     counts_per_turn: Option<f64>,
-    (rate_hz, undriven, split): (Option<f64>, bool, Option<f64>),
+    rate_undriven_split: (Option<f64>, bool, Option<f64>),
 ) -> PyResult<(PathBuf, Vec<PathBuf>, Vec<String>)> {
+    let (rate_hz, undriven, split) = rate_undriven_split;
     py.detach(|| {
         let columns = columns
             .iter()

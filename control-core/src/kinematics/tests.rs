@@ -108,7 +108,8 @@ fn a_rest_of_any_length_ends_without_a_speed() {
         for tick in 0..5_000 {
             speed(&mut estimator, tick.min(2_000) / 10);
         }
-        // As many ticks more as a rest of 2^32, less a few, still has, if each does what this one does.
+        // As many ticks more as a rest of 2^32, less a few, still has, if each does what this one
+        // does.
         let before = estimator.now;
         speed(&mut estimator, 200);
         let a_tick = estimator.now.wrapping_sub(before);

@@ -198,7 +198,8 @@ fn a_save_that_is_left_unfinished_changes_nothing() {
 }
 
 /// From every fill of the slot: power lost in the middle of every write of saving, in pieces as
-/// telemetry does, and in every write and erasure of the start that follows, which is then repeated.
+/// telemetry does, and in every write and erasure of the start that follows, which is then
+/// repeated.
 #[test]
 fn losing_power_anywhere_leaves_the_old_or_the_new() {
     let mut cuts = 0;

@@ -83,7 +83,8 @@ impl Shared {
         self.powered.load(Relaxed)
     }
 
-    /// Takes torque away at the next tick, whatever waits in the queues: what waits there gives none.
+    /// Takes torque away at the next tick, whatever waits in the queues: what waits there gives
+    /// none.
     pub(crate) fn stop(&self) {
         self.stops.store(self.stops.load(Relaxed).wrapping_add(1), Relaxed);
         self.trips.raise_stop();

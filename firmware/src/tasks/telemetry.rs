@@ -129,8 +129,8 @@ impl<B: Board> Telemetry<B> {
         self.was_ready = is_ready;
     }
 
-    /// Commands that take long, as a configuration does with 2 ms, end the turn: what comes after them
-    /// has the next one, so that telemetry reports between them.
+    /// Commands that take long, as a configuration does with 2 ms, end the turn: what comes after
+    /// them has the next one, so that telemetry reports between them.
     fn take_commands(&mut self, entered: u32) {
         // A start that follows a configuration waits behind it.
         let saving = Interlocks::of(Interlock::Saving);
@@ -215,8 +215,8 @@ impl<B: Board> Telemetry<B> {
         }
     }
 
-    /// What the tick has done beyond the samples that have come. It may run between the two reads,
-    /// and says that the amplifier is on before it says that it has taken a start.
+    /// Returns what the tick has done beyond the samples that have come. It may run between the two
+    /// reads, and says that the amplifier is on before it says that it has taken a start.
     fn ahead(&self) -> Ahead {
         let is_held = self.held.as_ref().is_some_and(AnyOrder::gives_torque);
         let is_valid = self.stops_before_start == self.shared.stops.load(Relaxed);

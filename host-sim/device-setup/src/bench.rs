@@ -27,7 +27,8 @@ pub enum Act {
     Pull(f64),
     /// Tilts the needle to so many rad below the horizontal.
     Tilt(f64),
-    /// Hangs so many g on the needle and lets them go gently within three seconds; 0 takes them off.
+    /// Hangs so many g on the needle and lets them go gently within three seconds; 0 takes them
+    /// off.
     Hang(f64),
 }
 

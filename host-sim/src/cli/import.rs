@@ -29,8 +29,8 @@ pub(crate) struct Import {
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// The column of the time, command, position, velocity, reference, tilt, force or enabled (1
-    /// where the drive was on), and its unit; a minus before the name changes the sign, FILE/NAME is
-    /// a column of one file, and none leaves the role empty
+    /// where the drive was on), and its unit; a minus before the name changes the sign, FILE/NAME
+    /// is a column of one file, and none leaves the role empty
     #[arg(long, value_name = "ROLE=NAME[:UNIT]")]
     column: Vec<String>,
     /// The column with the time stamps of one role, where channels have clocks of their own

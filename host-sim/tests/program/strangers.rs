@@ -299,7 +299,7 @@ fn points_and_commas_in_one_file_are_asked() {
 }
 
 #[test]
-fn a_position_loop_without_a_command_and_an_enable_column_have_a_way_in() {
+fn a_position_loop_and_an_enable_column_have_a_way_in() {
     let stiffness = 6.0;
     let rows = table("time,target_rad,position_rad", 4.0, |_, t| {
         format!("{t:.4},{:.6},{:.6}", motion(t, 0) + torque(t) / stiffness, motion(t, 0))

@@ -1,5 +1,6 @@
-//! What `import`, `simulate` and `fit-force` keep: a file that somebody changed, and no part of one
-//! under its name. And strangers' files from `import` to the report.
+//! Tests that `import`, `simulate` and `fit-force` keep a file that somebody changed and never
+//! leave part of one under its name, and that strangers' files are right from `import` to the
+//! report.
 
 use crate::common::axis::{RATE_HZ, file, import, motion, reading, table, torque};
 use crate::common::{folder, refused, run, run_well, text};

@@ -82,16 +82,19 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
         let _ = acks.push_back(ack);
     }
 
-    fn carry_out(&mut self, id: u32, command: Command) -> Result<(), CommandRefusal> {
-        if self.has_torque() && needs_torque_off(&command) {
+    /// Checks what can be known of a command before it is looked at.
+    fn check_turn(&self, id: u32, command: &Command) -> Result<(), CommandRefusal> {
+        if self.has_torque() && needs_torque_off(command) {
             return Err(CommandRefusal::Powered);
         }
-        if makes_plan(&command) && self.waiting.borrow().orders.is_full() {
+        if makes_plan(command) && self.waiting.borrow().orders.is_full() {
             return Err(CommandRefusal::Full);
         }
-        if gives_torque(&command) {
-            self.is_later_than_stop(id)?;
-        }
+        if gives_torque(command) { self.is_later_than_stop(id) } else { Ok(()) }
+    }
+
+    fn carry_out(&mut self, id: u32, command: Command) -> Result<(), CommandRefusal> {
+        self.check_turn(id, &command)?;
         match command {
             Command::Hello { version } => self.hello_to(version),
             Command::Heartbeat => self.order(Order::Heartbeat),

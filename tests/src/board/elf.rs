@@ -94,8 +94,8 @@ pub fn exits(bytes: &[u8], symbols: &[Symbol], address: u32) -> Vec<u32> {
     exits
 }
 
-/// Returns the addresses of the instructions that wait for an interrupt or an event, `wfi` and `wfe`
-/// (ARMv7-M manual, A7.7: `bf30`, `bf20`; `f3af 8003`, `f3af 8002`).
+/// Returns the addresses of the instructions that wait for an interrupt or an event, `wfi` and
+/// `wfe` (ARMv7-M manual, A7.7: `bf30`, `bf20`; `f3af 8003`, `f3af 8002`).
 #[must_use]
 pub fn waits(bytes: &[u8], symbols: &[Symbol]) -> Vec<u32> {
     let functions = symbols.iter().filter(|symbol| symbol.size > 0);

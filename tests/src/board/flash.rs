@@ -6,7 +6,8 @@
 //! whatever else it says (3.9.7); `STRT` in a locked register does nothing and reports nothing.
 //! While a sector is erased the core gets no instruction from the flash (3.6: "any attempt to read
 //! … causes the bus to stall"): for its whole time nothing runs, the watchdog excepted. The same
-//! holds for the time in which it takes a word. The interface's registers stay the emulator's; this model watches what is written to them.
+//! holds for the time in which it takes a word. The interface's registers stay the emulator's; this
+//! model watches what is written to them.
 
 mod options;
 

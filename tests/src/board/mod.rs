@@ -30,6 +30,7 @@ mod stopped;
 pub mod tilt;
 mod tracks;
 mod usb_port;
+mod usb_power;
 mod warm_core;
 mod watch;
 pub mod wires;

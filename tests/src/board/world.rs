@@ -313,8 +313,7 @@ impl World {
                         self.latch_at = self.trigger_due(session, at);
                         self.pause(session);
                     }
-                    GPIO_FIRST..=GPIO_LAST if write => {
-                        let address = access.address;
+                    address @ GPIO_FIRST..=GPIO_LAST if write => {
                         self.watch_strap(at, address, value);
                         self.tracks.register_written(session, at, address);
                         self.watch_enable(session, at);

@@ -1,5 +1,5 @@
-//! A tick with none of its code in the flash's cache: other tasks have used the cache since the tick
-//! before, and the tick's code is more than it holds (RM0090 3.5.2).
+//! A tick with none of its code in the flash's cache: other tasks have used the cache since the
+//! tick before, and the tick's code is more than it holds (RM0090 3.5.2).
 
 use super::instructions::{BEGIN, TICK, all_fed_forward, path};
 use control_core::Config;
@@ -13,9 +13,9 @@ use tests::scenario::{COUNTS_PER_MM, venepuncture};
 /// The converter is latched so many cycles after the tick's edge.
 const LATCH_CYCLES: u32 = 3_360;
 
-/// Counts the lines of code of the ticks between two times, in ms from [`BEGIN`] on, of a needle that
-/// the plant moves. With every line from the flash, without prefetch, and one and a half cycles for
-/// an instruction, the code is written before the converter takes it.
+/// Counts the lines of code of the ticks between two times, in ms from [`BEGIN`] on, of a needle
+/// that the plant moves. With every line from the flash, without prefetch, and one and a half
+/// cycles for an instruction, the code is written before the converter takes it.
 fn is_done_before_the_latch(
     name: &str,
     config: &Config,

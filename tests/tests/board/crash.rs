@@ -63,8 +63,8 @@ fn a_wild_pointer_names_its_instruction_and_its_address() {
 
 /// Stores `value` to both addresses, as a stray write that makes an exception pending.
 fn stray_write(rig: &mut Rig, addresses: [u32; 2], value: u32) -> Effect {
-    // `ldr r0, [pc, #8]`, `ldr r1, [pc, #12]`, `str r1, [r0]`, `ldr r0, [pc, #12]`, `str r1, [r0]`, `b .`,
-    // what they load.
+    // `ldr r0, [pc, #8]`, `ldr r1, [pc, #12]`, `str r1, [r0]`, `ldr r0, [pc, #12]`, `str r1, [r0]`,
+    // `b .`, what they load.
     let program = [0x4903_4802, 0x4803_6001, 0xE7FE_6001, addresses[0], value, addresses[1]];
     rig.board.at_stop(move |stopped| {
         for (at, word) in (BEYOND..).step_by(4).zip(program) {

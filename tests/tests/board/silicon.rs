@@ -176,8 +176,8 @@ fn the_boards_own_usb_power_stays_off() {
     is_allowed(&mut board);
 }
 
-/// ES0182 2.1.3: with `DBG_SLEEP` set, a core that wakes from a `wfi` or `wfe` in flash may carry out
-/// what it never fetched. In RAM, with three `NOP`s behind it, it does not.
+/// ES0182 2.1.3: with `DBG_SLEEP` set, a core that wakes from a `wfi` or `wfe` in flash may carry
+/// out what it never fetched. In RAM, with three `NOP`s behind it, it does not.
 #[test]
 fn no_image_waits_in_flash() {
     const RAM: std::ops::Range<u32> = 0x2000_0000..0x2003_0000;

@@ -16,9 +16,9 @@ use tests::rig::Rig;
 
 /// Streams of the test; `STREAMS` in the environment is another number, and `FIRST` the first seed.
 const STREAMS: u64 = 300;
-/// A stop is answered within this time where the amplifier is on, and within the longer one where it
-/// is off and the device may be planning what it was configured to. The amplifier is off this long
-/// after the answer.
+/// A stop is answered within this time where the amplifier is on, and within the longer one where
+/// it is off and the device may be planning what it was configured to. The amplifier is off this
+/// long after the answer.
 const ANSWER: Nanos = 2 * MILLISECOND;
 const ANSWER_OFF: Nanos = 20 * MILLISECOND;
 const OFF: Nanos = MILLISECOND;
@@ -122,6 +122,9 @@ impl Stream {
         let rig = if random.below(2) == 0 { Rig::pressed() } else { Rig::zeroed(Wiring::default()) };
         let since = rig.board.now();
         let mut stream = Self { rig, sent: Vec::new(), since };
+        if random.below(4) == 0 {
+            stream.stop_start_configure(&mut random);
+        }
         for _ in 0..4 + random.below(13) {
             for command in commands(&mut random, &stream.rig) {
                 stream.send(command);
@@ -133,6 +136,20 @@ impl Stream {
         }
         stream.run_to(stream.rig.board.now() + ANSWER_OFF);
         stream
+    }
+
+    /// A start and a configuration shortly after a stop, and another stop: what an image once held
+    /// back for seconds.
+    fn stop_start_configure(&mut self, random: &mut Random) {
+        let mut device = laws::phantom().device;
+        device.limits.fade_in_ms = 100 + random.below(400) as u16;
+        let record = self.rig.pc.record_of(device);
+        let gaps = [400_000, 1, 5 * MILLISECOND, MILLISECOND];
+        for (command, gap) in [Command::Stop, Command::Start, record, Command::Stop].into_iter().zip(gaps) {
+            self.send(command);
+            let at = self.rig.board.now() + random.below(gap);
+            self.run_to(at);
+        }
     }
 
     fn send(&mut self, command: Command) -> usize {
@@ -156,7 +173,7 @@ impl Stream {
         }
     }
 
-    /// Sends a command until it is carried out or refused for good: a device that saves is busy.
+    /// Sends a command until it is carried out or refused: a device that saves is busy.
     fn ask(&mut self, command: Command) -> Result<(), CommandRefusal> {
         let end = self.rig.board.now() + SAVED;
         loop {

@@ -99,8 +99,8 @@ impl Stage {
         number.unwrap_or_else(|| panic!("no number of {unit} in \"{line}\""))
     }
 
-    /// What is drawn from an input of the amplifier to `place`: R2, with the capacitor where it is in
-    /// parallel, at `hertz`.
+    /// Returns the impedance drawn from an input of the amplifier to `place`: R2, with the
+    /// capacitor where it is in parallel, at `hertz`.
     fn across(&self, place: &str, r2: f64, hertz: f64) -> Complex {
         let ends_there = |line: &&str| {
             let after = line.split_once("R2").and_then(|(_, after)| after.split_once("──"));

@@ -139,8 +139,8 @@ fn a_configuration_is_saved_without_torque_or_reported_failed() {
     assert!(desk.tick.large_orders.dequeue().is_some(), "it is in force all the same");
 }
 
-/// The flash takes its time; what was ordered after a configuration waits behind it, and of a PC that
-/// has gone its start alone is forgotten.
+/// The flash takes its time; what was ordered after a configuration waits behind it, and of a PC
+/// that has gone its start alone is forgotten.
 #[test]
 fn a_save_takes_many_turns_and_outlives_its_pc() {
     let mut config = Device::commissioned_virtual();
@@ -206,7 +206,7 @@ fn orders_that_the_tick_has_no_room_for_wait() {
 }
 
 #[test]
-fn a_configuration_is_refused_until_the_tick_has_taken_the_start() {
+fn a_start_on_its_way_refuses_a_configuration() {
     let mut config = Device::commissioned_virtual();
     config.limits.fade_in_ms = 444;
     let mut desk = Desk::in_session();

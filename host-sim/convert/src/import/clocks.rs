@@ -256,8 +256,8 @@ fn different_clocks(table: &ColumnTable) -> Vec<usize> {
     found.into_iter().map(|(at, _)| at).collect()
 }
 
-/// Gives the channels of a table their clocks: those beside it, where clocks and channels alternate,
-/// else the one whose name has a word of the channel's.
+/// Gives the channels of a table their clocks: those beside it, where clocks and channels
+/// alternate, else the one whose name has a word of the channel's.
 fn pair(table: &mut ColumnTable, notes: &mut Vec<String>) {
     let clocks = different_clocks(table);
     if clocks.len() < 2 {

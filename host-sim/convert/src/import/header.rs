@@ -1,5 +1,5 @@
-//! The names and units of a text's columns: from the lines above the numbers, a comment, or pairs of
-//! keys and values as scopes export them.
+//! The names and units of a text's columns: from the lines above the numbers, a comment, or pairs
+//! of keys and values as scopes export them.
 
 use super::layout::{Layout, Lines};
 use super::units::{self, Written};
@@ -65,9 +65,10 @@ fn trimmed(row: &[&str]) -> Vec<String> {
     row.iter().map(|f| f.trim().trim_matches('"').trim().to_owned()).collect()
 }
 
-/// Names and units from lines such as `Name;torque;Name;angle` above pairs of a clock and a channel.
+/// Names and units from lines such as `Name;torque;Name;angle` above pairs of a clock and a
+/// channel.
 fn keys_and_values(above: Above, layout: Layout) -> Option<Names> {
-    if layout.count % 2 == 1 || layout.count < 2 {
+    if !layout.count.is_multiple_of(2) || layout.count < 2 {
         return None;
     }
     let rows: Vec<Vec<String>> = above.lines.iter().map(|(_, line)| trimmed(&layout.fields(line))).collect();
@@ -83,7 +84,7 @@ fn keys_and_values(above: Above, layout: Layout) -> Option<Names> {
     // `SampleTime[ms]` has the unit of the clocks.
     let clock = by_key(&["sampletime", "sample time", "time"]).and_then(|row| units::split_name(&row[0]).1);
     let channel = |i: usize| {
-        if i % 2 == 0 {
+        if i.is_multiple_of(2) {
             return (Some(format!("time of {}", names[i + 1])), clock.clone());
         }
         (Some(names[i].clone()), units.and_then(|row| units::written(&row[i])))

@@ -1,5 +1,6 @@
-//! Readings that the axis cannot have made: values that stand for a failure, rows that jump away and
-//! back, counters that begin again, two axes in one column. They are left out or cut, with a note.
+//! Readings that the axis cannot have made: values that stand for a failure, rows that jump away
+//! and back, counters that begin again, two axes in one column. They are left out or cut, with a
+//! note.
 
 use super::role::Role;
 use super::rows::{Rows, pick, slice};
@@ -29,7 +30,7 @@ const SENTINELS: [f64; 17] = [
 const LARGEST: f64 = 1e15;
 /// A row is off if it is this many times farther from its neighbours than nearly all rows are.
 const FAR: f64 = 12.0;
-/// A jump is none of the axis if it is this many times as long as nearly all steps.
+/// The axis cannot have made a jump that is this many times as long as nearly all steps.
 const JUMP: f64 = 10.0;
 /// A command is off if it is this many times as far from the others as they are from each other.
 const SPIKE: f64 = 8.0;
@@ -143,7 +144,8 @@ fn without_spikes(run: Rows, notes: &mut Vec<String>) -> Rows {
     pick(&run, |i| !found.contains(&i))
 }
 
-/// Leaves rows out in which the position jumps away and back, or the command is far from all others.
+/// Leaves rows out in which the position jumps away and back, or the command is far from all
+/// others.
 pub(super) fn without_outliers(run: Rows, notes: &mut Vec<String>) -> Rows {
     let run = without_spikes(run, notes);
     let Some(x) = run.columns.get(&Role::Position).filter(|x| x.len() > 50) else { return run };

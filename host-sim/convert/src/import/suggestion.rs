@@ -64,7 +64,7 @@ pub(super) fn suggested(column: &Column) -> Option<(Role, u32)> {
     by_name(column, &words, &own).filter(takes).or_else(|| by_unit(quantity?))
 }
 
-/// How good a match of the time a column is; none where it is another's.
+/// Returns how well a column matches the time; `None` where it is another quantity's.
 fn rank_as_time(column: &Column, words: &[String], own: &[String]) -> Option<u32> {
     let is = |list: &str| own.len() == 1 && is_in(list, &own[0]);
     if let Some(unit) = column.unit {

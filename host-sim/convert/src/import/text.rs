@@ -127,7 +127,8 @@ fn lines_and_comments(text: &str) -> (Lines<'_>, Lines<'_>) {
     (lines, comments)
 }
 
-/// The numbers of a column, and the first value that is not a number, its line, and how many there are.
+/// The numbers of a column, and the first value that is not a number, its line, and how many there
+/// are.
 type Values = (Vec<f64>, Option<(String, usize, usize)>);
 
 /// The values of each column; lines of another number of fields or without a number are left out,

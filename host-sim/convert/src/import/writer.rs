@@ -120,8 +120,9 @@ fn csv(run: &Rows, scale: Scale, out: &mut impl std::io::Write) -> std::io::Resu
     Ok(())
 }
 
-/// Writes every run and, where `rig` has a text, `rig.toml`, into `dir`; the paths of the runs. What
-/// an earlier import wrote there is replaced, or removed, but never a file that somebody changed.
+/// Writes every run and, where `rig` has a text, `rig.toml`, into `dir`; the paths of the runs.
+/// What an earlier import wrote there is replaced, or removed, but never a file that somebody
+/// changed.
 pub(super) fn files(
     dir: &Path,
     rig: Option<&str>,

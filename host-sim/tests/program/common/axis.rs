@@ -1,4 +1,5 @@
-//! An axis whose truth is known, files of it as strangers have them, and what `import` makes of them.
+//! An axis whose truth is known, files of it as strangers have them, and what `import` makes of
+//! them.
 
 use super::{folder, refused, run, run_well, text};
 use diagnosis::recording::Recording;
