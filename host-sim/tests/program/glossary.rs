@@ -35,6 +35,10 @@ fn the_glossary_quotes_every_fault_and_refusal_exactly() {
         // Any field.
         CommandRefusal::Commissioned(Field::TorqueLimit),
         CommandRefusal::NotShown,
+        // Any fault.
+        CommandRefusal::Faulted(Fault::EmergencyStop),
+        CommandRefusal::NotStopped,
+        CommandRefusal::Overtaken,
     ];
     let interlocked = Interlock::ALL.map(CommandRefusal::Interlocked);
     let sequence = [

@@ -111,6 +111,10 @@ fn torque_ends_with_the_pc_and_does_not_return_with_it() {
     assert!(!bench.device.is_enabled(), "no set value of an earlier connection");
     bench.driver.start();
     bench.run(100, |_| {});
+    assert!(!bench.device.is_enabled(), "nobody has cleared the fault");
+    bench.driver.clear();
+    bench.driver.start();
+    bench.run(100, |_| {});
     assert!(bench.device.is_enabled());
 }
 

@@ -114,6 +114,8 @@ fn a_sensor_that_came_off_since_commissioning_prevents_a_start() {
     pc.must(&mut board, ramps(GENTLE_TORQUE, 0.0));
     pc.run_ms(&mut board, 600);
     pc.must(&mut board, Command::Commission);
+    // It is saved in pieces.
+    pc.run_ms(&mut board, 100);
     let start_with = |board: &mut Board, pc: &mut Pc, fitted, command: Option<Command>| {
         board.at_stop(move |stopped| {
             stopped.set_fitted(fitted);

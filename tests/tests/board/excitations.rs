@@ -165,6 +165,7 @@ fn a_sequence_stops_at_once_and_nothing_of_it_is_left() {
     };
     assert!(off - since <= 300 * MILLISECOND, "{} ns after the last word", off - since);
     pc.set_silent(false);
+    [Command::Stop, Command::Clear].into_iter().for_each(|clear| pc.must(&mut board, clear));
     // Uploaded before the next session begins, it is not that session's.
     commands[..3].iter().for_each(|segment| pc.must(&mut board, segment.clone()));
     pc.hello(&mut board);
