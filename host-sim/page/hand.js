@@ -78,9 +78,9 @@ export class Hand {
   nameButtons() {
     const [start, stop] = [document.getElementById("start"), document.getElementById("stop")];
     const recording = this.source === "recording";
-    const what = recording ? "play" : this.faulted ? "clear" : "start";
-    start.textContent = t(`start.${what}`);
-    start.title = t(what === "start" ? "start.title" : `start.${what}_title`);
+    if (recording) [start.textContent, start.title] = [t("start.play"), t("start.play_title")];
+    else if (this.faulted) [start.textContent, start.title] = [t("start.clear"), t("start.clear_title")];
+    else [start.textContent, start.title] = [t("start.start"), t("start.title")];
     stop.firstChild.data = t(recording ? "stop.pause" : "stop.stop");
     stop.title = t(recording ? "stop.pause_title" : "stop.title");
   }
