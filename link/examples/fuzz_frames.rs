@@ -68,7 +68,7 @@ fn encoded(frame: &HostFrame) -> Vec<u8> {
 
 /// `sent` are the segments that a device has which has taken each of them.
 fn command(random: &mut fastrand::Rng, id: u32, sent: &mut Vec<Excitation>) -> Vec<u8> {
-    let command = match random.u8(0..23) {
+    let command = match random.u8(0..24) {
         0 => Command::Hello { version: random.u16(0..3) },
         1 => Command::ConfigurePatient(config(random).patient),
         6 => Command::ConfigureDevice(config(random).device),
@@ -88,6 +88,7 @@ fn command(random: &mut fastrand::Rng, id: u32, sent: &mut Vec<Excitation>) -> V
         4 => Command::Zero,
         5 => Command::Heartbeat,
         20 => Command::GuardSupply { set: random.bool() },
+        21 => Command::Clear,
         _ => return (0..random.usize(0..1500)).map(|_| random.u8(..)).collect(),
     };
     encoded(&HostFrame { id, command })

@@ -57,7 +57,7 @@ impl Profile {
     ) -> (Board, Pc) {
         let Rig { mut board, mut pc } = Rig::connected(Wiring::default(), plant);
         pc.configure(&mut board, &config);
-        // The tick takes it once it is saved, in a tick that is none of these.
+        // The tick takes it once it is saved, not in one of these ticks.
         pc.run_ms(&mut board, 60);
         // Only with the rotor's angle is all of a compensation fed forward.
         pc.must(&mut board, Command::Index(Some(17)));
