@@ -180,7 +180,8 @@ impl<B: Board> Telemetry<B> {
         } else {
             Err(CommandRefusal::Powered)
         };
-        self.shared.conditions.set(Interlock::Saving, false);
+        // A configuration may be half saved.
+        self.shared.conditions.set(Interlock::Saving, self.saving.is_some());
         self.endpoint.answer_guard(result);
     }
 
