@@ -7,8 +7,8 @@ use control_core::{Config, Controller, Plan};
 use link::Command;
 use link::frames::EventKind;
 
-use crate::board::{Board, Log};
 use crate::pc::Pc;
+use emulator::board::{Board, Log};
 
 /// A tick as the pins show it: the counter the firmware read, and the code it wrote before it read
 /// the counter again.

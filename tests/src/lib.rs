@@ -1,12 +1,9 @@
 //! The flash image on an emulated board, end to end.
 //!
-//! [`board`] runs the image; [`usb_host`] is the PC's end of its cable; [`pc`] is the program on
-//! that PC; [`browser`] looks at its page; [`bootloader`] is the one in ROM. The tests in `tests/`
-//! say what the device promises. Nothing here is part of the product, and nothing of it reaches
-//! into the firmware: one image, no feature flag for tests.
+//! [`emulator`] runs the image; [`pc`] is the program on the PC at the other end of its cable;
+//! [`browser`] looks at its page. The tests in `tests/` say what the device promises. Nothing here
+//! is part of the product.
 
-pub mod board;
-pub mod bootloader;
 pub mod browser;
 pub mod follow;
 pub mod laws;
@@ -16,7 +13,6 @@ pub mod pc;
 pub mod rig;
 pub mod scenario;
 pub mod start;
-pub mod usb_host;
 
 /// The variable of the environment by which `cargo xtask bench` asks a test to measure for longer
 /// than it needs to pass or fail.

@@ -5,7 +5,7 @@
 use std::f64::consts::TAU;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use crate::board::plant::{Drive, Nanos, PlantSide};
+use emulator::board::plant::{Drive, Nanos, PlantSide};
 
 /// Roller's radius in m, counts a turn, and the motor's torque at full scale in N·m.
 const RADIUS: f64 = 0.01;

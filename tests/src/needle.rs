@@ -3,7 +3,7 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use crate::board::plant::{Drive, Nanos, PlantSide};
+use emulator::board::plant::{Drive, Nanos, PlantSide};
 
 /// Needle, roller and rotor in kg; dry friction in N; viscous in N·s/m.
 const MASS: f64 = 0.03;

@@ -17,8 +17,8 @@ use link::frames::{Ack, CommandRefusal, Event, EventKind, Hello, PROTOCOL_VERSIO
 use link::host::{Commands, Counts, Reception};
 use link::{Command, DeviceFrame};
 
-use crate::board::Board;
-use crate::usb_host::Port;
+use emulator::board::Board;
+use emulator::usb_host::Port;
 
 /// The period of the PC's heartbeats: a quarter of the shortest default timeout.
 const HEARTBEAT_MS: u64 = 50;

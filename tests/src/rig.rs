@@ -4,12 +4,12 @@ use control_core::event::Fault;
 use link::Command;
 use link::frames::{CommandRefusal, EventKind};
 
-use crate::board::processor::FIRST_EXTERNAL;
-use crate::board::{Board, Drive, Effect, MILLISECOND, Nanos, PlantSide, Wiring, plant};
 use crate::pc::Pc;
 use crate::scenario::{COUNTS_PER_MM, board_wired};
 use crate::start::Start;
-use crate::usb_host::Port;
+use emulator::board::processor::FIRST_EXTERNAL;
+use emulator::board::{Board, Drive, Effect, MILLISECOND, Nanos, PlantSide, Wiring, plant};
+use emulator::usb_host::Port;
 
 /// Zero torque of the 12-bit converter.
 pub const ZERO_TORQUE: u16 = 2048;

@@ -1,7 +1,7 @@
 //! Hands on the needle: the paths that several tests move it along.
 
-use crate::board::plant::{self, Nanos, PlantSide};
-use crate::board::{Board, Wiring, image_for};
+use emulator::board::plant::{self, Nanos, PlantSide};
+use emulator::board::{Board, Wiring, image_for};
 
 /// Counts of the encoder for a millimetre of needle, at the default configuration's 10 mm roller
 /// and 4,000 counts a turn, rounded down.

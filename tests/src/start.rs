@@ -8,9 +8,9 @@ use std::any::Any;
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-use crate::board::plant::PlantSide;
-use crate::board::{Board, Saved, Wiring};
 use crate::pc::Pc;
+use emulator::board::plant::PlantSide;
+use emulator::board::{Board, Saved, Wiring};
 
 /// A board as it was saved, the PC on its cable, and what else the test has at hand by then.
 #[derive(Debug)]

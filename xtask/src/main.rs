@@ -47,7 +47,7 @@ The project's chores.
   cargo xtask flash [--dfu]     flashes it with probe-rs; --dfu: over USB, without a probe
                                 both, and board-test, take --board: discovery (default), nucleo-f429zi
   cargo xtask dist              both boards' images (ELF, BIN, DFU) and the program for this PC, to hand on: target/dist
-  cargo xtask wasm              builds what the page computes in the browser, into host-sim/page
+  cargo xtask wasm              builds what the page computes in the browser, into host-sim/page/js
   cargo xtask site              the whole simulator as one folder without a server: target/site
   cargo xtask wiring            draws both boards' wiring from the tables in docs/hardware.md
   cargo xtask board-test        the image's hardware, on a real board; says so where there is none
@@ -121,7 +121,17 @@ fn for_board(rest: &[String], chore: impl Fn(&Board) -> Result<(), Error>) -> Re
 
 fn prove(rest: &[String]) -> Result<(), Error> {
     let status = shell::cargo()
-        .args(["run", "--release", "--ignore-rust-version", "--quiet", "-p", "proof", "--bin", "prove", "--"])
+        .args([
+            "run",
+            "--release",
+            "--ignore-rust-version",
+            "--quiet",
+            "-p",
+            "benchmark",
+            "--bin",
+            "prove",
+            "--",
+        ])
         .args(rest)
         .status()
         .map_err(|error| Error::new(format!("cargo could not be started: {error}")))?;

@@ -1,4 +1,4 @@
-//! The Python package as a wheel, which maturin makes of `python/`.
+//! The Python package as a wheel, which maturin makes of `diagnosis/python`.
 
 use crate::shell::{self, Error};
 use std::fs;
@@ -15,7 +15,10 @@ pub(crate) fn wheel(python: &Path, folder: &Path) -> Result<PathBuf, Error> {
     let mut build = Command::new(python);
     build.args(["-m", "maturin", "build", "--release", "--quiet", "--out"]).arg(folder);
     // The stable ABI: no interpreter has a say in it.
-    build.arg("--manifest-path").arg(shell::top().join("python/Cargo.toml")).arg("--ignore-rust-version");
+    build
+        .arg("--manifest-path")
+        .arg(shell::top().join("diagnosis/python/Cargo.toml"))
+        .arg("--ignore-rust-version");
     shell::run(&mut build)?;
     files(folder)
         .into_iter()

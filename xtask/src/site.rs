@@ -16,19 +16,19 @@ use std::process::Command;
 /// The instructor's page, which is of no use without devices to look at.
 const CLASS_PAGE: &str = "class.js";
 /// The page, and what takes the place of some of its modules.
-const PAGE: &str = "host-sim/page";
-const IN_PLACE: &str = "site-wasm/page";
+const PAGE: &str = "host-sim/page/js";
+const IN_PLACE: &str = "host-sim/page/simulator-wasm/page";
 /// The folder of its texts, a module for each language.
 const STRINGS: &str = "strings";
 /// The page of a real board, and the modules that it shares with the other pages.
-const BOARD: &str = "board-wasm/page";
+const BOARD: &str = "host-sim/page/board-wasm/page";
 const BOARD_SHARES: [&str; 2] = ["guide_steps.js", "bytes.js"];
 /// Profiles and ticks whose bits are compared: an insertion and withdrawal each.
 const COMPARED: [(&str, &str); 2] = [("adult", "80000"), ("firm-skin", "80000")];
 
 /// Builds the site into `target/site`; its page.
 pub(crate) fn build() -> Result<PathBuf, Error> {
-    let device = wasm::build_crate("site-wasm")?;
+    let device = wasm::build_crate("simulator-wasm")?;
     let board = wasm::build_crate("board-wasm")?;
     let top = shell::top();
     let pages = top.join(PAGE);
@@ -95,13 +95,16 @@ pub(crate) fn run() -> Result<(), Error> {
 /// Checks that the device in the browser gives the same bits as host-sim's.
 pub(crate) fn check() -> Result<(), Error> {
     setup::node()?;
-    let device = wasm::build_crate("site-wasm")?;
+    let device = wasm::build_crate("simulator-wasm")?;
     let program = built(&["--example", "device_digest"], "examples/device_digest")?;
     for (profile, ticks) in COMPARED {
         let native = shell::output(Command::new(&program).args([profile, ticks]))?;
         let mut node = Command::new("node");
         let browser = shell::output(
-            node.current_dir(shell::top()).arg("site-wasm/digest.mjs").arg(&device).args([profile, ticks]),
+            node.current_dir(shell::top())
+                .arg("host-sim/page/simulator-wasm/digest.mjs")
+                .arg(&device)
+                .args([profile, ticks]),
         )?;
         eprintln!("{profile}: {} natively, {} as WebAssembly", native.trim(), browser.trim());
         if native.trim() != browser.trim() {

@@ -113,9 +113,9 @@ fn unit() -> Result<(), Error> {
     let mut tests = tests();
     if has_nextest() {
         // Built with what the other steps run, so that they find it.
-        real_recordings::leave_out(&mut tests, "not package(tests)", &absent);
+        real_recordings::leave_out(&mut tests, "not (package(tests) or package(emulator))", &absent);
     } else {
-        real_recordings::skip(tests.args(["--exclude", "tests", "--"]), &absent);
+        real_recordings::skip(tests.args(["--exclude", "tests", "--exclude", "emulator", "--"]), &absent);
     }
     shell::run(&mut tests)
 }
@@ -173,7 +173,10 @@ fn board() -> Result<(), Error> {
         firmware::build_with_own_test(board)?;
     }
     if has_nextest() {
-        shell::run(tests().args(["-E", "package(tests) and not (binary(page) or binary(board))"]))?;
+        shell::run(
+            tests()
+                .args(["-E", "package(emulator) or package(tests) and not (binary(page) or binary(board))"]),
+        )?;
     }
     // In one process: what the emulator has translated of an image serves all tests.
     let mut tests = cargo();
@@ -223,7 +226,7 @@ fn clients() -> Result<(), Error> {
             .args(["-m", "pip", "install", "--quiet", "--force-reinstall", "--no-deps"])
             .arg(wheel),
     )?;
-    let tests = shell::top().join("python/tests");
+    let tests = shell::top().join("diagnosis/python/tests");
     shell::run(Command::new(&python).args(["-m", "pytest", "--quiet", "-p", "no:cacheprovider"]).arg(tests))
 }
 

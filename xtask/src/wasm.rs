@@ -12,10 +12,15 @@ use std::process::Command;
 /// The browser's target.
 pub(crate) const TARGET: &str = "wasm32-unknown-unknown";
 /// The crates that it is built from: the sources and manifests in their folders.
-const CRATES: [&str; 4] = ["anatomy", "tissue", "ultrasound", "page-wasm"];
+const CRATES: [&str; 4] = [
+    "host-sim/picture/anatomy",
+    "host-sim/picture/tissue",
+    "host-sim/picture/ultrasound",
+    "host-sim/page/picture-wasm",
+];
 /// The product and its note.
-const PRODUCT: &str = "host-sim/page/picture.wasm";
-const NOTE: &str = "host-sim/page/picture.wasm.from";
+const PRODUCT: &str = "host-sim/page/js/picture.wasm";
+const NOTE: &str = "host-sim/page/js/picture.wasm.from";
 /// Four numbers at once: every browser of the last years has it.
 const FEATURES: &str = "-Ctarget-feature=+simd128";
 
@@ -31,7 +36,7 @@ pub(crate) fn build_crate(package: &str) -> Result<PathBuf, Error> {
 
 /// Builds the product anew and writes it with its note.
 pub(crate) fn run() -> Result<(), Error> {
-    let built = read(&build_crate("page-wasm")?)?;
+    let built = read(&build_crate("picture-wasm")?)?;
     let top = shell::top();
     write(&top.join(PRODUCT), &built)?;
     write(&top.join(NOTE), note(&built)?.as_bytes())?;
@@ -56,7 +61,7 @@ pub(crate) fn check() -> Result<&'static str, Error> {
     if line("compiler") != Some(&compiler()?) || !setup::has_target(TARGET) {
         return Ok("by the hashes of its sources; there is no compiler of the same version here");
     }
-    if read(&build_crate("page-wasm")?)? != product {
+    if read(&build_crate("picture-wasm")?)? != product {
         return Err(Error::new(format!(
             "{PRODUCT} differs from what its sources give here; run `cargo xtask wasm` and commit what it writes"
         )));

@@ -228,8 +228,8 @@ fn a_key_of_a_shape_is_spelled_in_effects_alone() {
     let top = Path::new(env!("CARGO_MANIFEST_DIR"));
     let mut files = Vec::new();
     sources(&top.join("src"), &mut files);
-    for below in ["experiment/src", "device-setup/src", "lab/src"] {
-        sources(&top.join("../host-sim").join(below), &mut files);
+    for below in ["experiment/src", "../host-sim/device-setup/src", "../host-sim/lab/src"] {
+        sources(&top.join(below), &mut files);
     }
     let text = |file: &PathBuf| fs::read_to_string(file).expect("a source can be read");
     let tests: Vec<PathBuf> = files

@@ -3,7 +3,7 @@
 //! page.
 //!
 //! It opens no sockets, no ports, and no files except those that a person names, so that the
-//! browser's build (`site-wasm`) uses it unchanged.
+//! browser's build (`simulator-wasm`) uses it unchanged.
 
 pub mod device;
 pub mod driver;

@@ -8,9 +8,9 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
+use emulator::board::{Board, Drive, Nanos, Wiring, firmware_path};
+use emulator::usb_host::Port;
 use serialport::{SerialPort, TTYPort};
-use tests::board::{Board, Drive, Nanos, Wiring, firmware_path};
-use tests::usb_host::Port;
 
 const HELP: &str = "\
 Runs the flash image on an emulated STM32F4DISCOVERY and puts its serial port on a pseudo-terminal.
@@ -74,7 +74,7 @@ fn hand() -> impl FnMut(Nanos, Drive) -> i64 + Send {
 fn run(options: Options) -> Result<(), String> {
     let wiring = Wiring::default();
     let board = if options.held {
-        Board::on(&options.image, wiring, tests::board::plant::held())
+        Board::on(&options.image, wiring, emulator::board::plant::held())
     } else {
         Board::on(&options.image, wiring, hand())
     };

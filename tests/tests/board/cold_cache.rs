@@ -3,9 +3,9 @@
 
 use super::instructions::{BEGIN, TICK, all_fed_forward, path};
 use control_core::Config;
+use emulator::board::plant::{self, PlantSide};
+use emulator::board::{MILLISECOND, ToCode, Wiring, cache};
 use link::Command;
-use tests::board::plant::{self, PlantSide};
-use tests::board::{MILLISECOND, ToCode, Wiring, cache};
 use tests::laws;
 use tests::rig::Rig;
 use tests::scenario::{COUNTS_PER_MM, venepuncture};

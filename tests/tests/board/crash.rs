@@ -1,9 +1,9 @@
 //! The record that a crash leaves in RAM outlives the reset, and a PC receives it after its hello.
 
+use emulator::board::{Effect, MILLISECOND};
 use link::Command;
 use link::crash::{Crash, CrashKind};
 use link::frames::EventKind;
-use tests::board::{Effect, MILLISECOND};
 use tests::rig::{Rig, task};
 
 /// Memory that the part has and the firmware does not know of.

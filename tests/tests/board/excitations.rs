@@ -4,12 +4,12 @@
 use control_core::event::State;
 use control_core::excitation::{Excitation, SequenceRefusal, Servo, Signal};
 use control_core::units::{Damping, Millimetres, MillimetresPerSecond, MillinewtonMetres, Stiffness};
+use emulator::board::{Board, MILLISECOND, Nanos, Wiring};
 use fixed::types::{I8F24, I16F16};
 use link::Command;
 use link::codec::{self, MAX_FRAME};
 use link::device::LATE_TICKS;
 use link::frames::{CommandRefusal, HostFrame};
-use tests::board::{Board, MILLISECOND, Nanos, Wiring};
 use tests::pc;
 use tests::rig::{Rig, ZERO_TORQUE};
 

@@ -4,11 +4,11 @@ use control_core::event::{Fault, Limits};
 use control_core::interlock::Interlock;
 use control_core::units::MillinewtonMetres;
 use control_core::{Config, Device};
+use emulator::board::tilt::{Health, Model};
+use emulator::board::{Board, Effect, MILLISECOND, Nanos, Wiring, firmware_path, plant, record};
 use fixed::types::I16F16;
 use link::Command;
 use link::frames::{CommandRefusal, EventKind};
-use tests::board::tilt::{Health, Model};
-use tests::board::{Board, Effect, MILLISECOND, Nanos, Wiring, firmware_path, plant, record};
 use tests::pc::Pc;
 use tests::rig::{PRESSED, Rig, ZERO_TORQUE, task};
 

@@ -4,8 +4,8 @@
 use control_core::Config;
 use control_core::config::DacWidth;
 use control_core::event::Fault;
+use emulator::board::{MILLISECOND, Nanos, SetValue, Wiring, plant};
 use link::Command;
-use tests::board::{MILLISECOND, Nanos, SetValue, Wiring, plant};
 use tests::pc::Pc;
 use tests::rig::{PRESSED, Rig, ZERO_TORQUE};
 use tests::scenario::{board_wired, venepuncture};
@@ -44,7 +44,7 @@ fn eight_lines_carry_only_the_codes_of_their_configuration() {
 
     let (lines, on_chip) = board.at_stop(|stopped| {
         let log = std::mem::take(stopped.log());
-        let codes = |outputs: Vec<tests::board::Output>| outputs.into_iter().map(|output| output.code);
+        let codes = |outputs: Vec<emulator::board::Output>| outputs.into_iter().map(|output| output.code);
         (changes(codes(log.put_out)), changes(codes(log.written)))
     });
     let mut wanted = changes(pc.heard.samples[first..].iter().map(|(_, sample)| sample.dac));

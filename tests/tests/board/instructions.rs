@@ -13,10 +13,10 @@ use control_core::units::{
     Damping, FrictionPerMillimetre, JogCompliance, Millimetres, MillimetresPerSecond, MillinewtonMetres,
     Newtons, Stiffness,
 };
+use emulator::board::plant::{self, PlantSide};
+use emulator::board::{Board, MILLISECOND, Nanos, Wiring};
 use fixed::types::{I8F24, I16F16};
 use link::Command;
-use tests::board::plant::{self, PlantSide};
-use tests::board::{Board, MILLISECOND, Nanos, Wiring};
 use tests::laws;
 use tests::pc::{self, Pc};
 use tests::rig::Rig;

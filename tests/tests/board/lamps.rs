@@ -1,8 +1,8 @@
 //! The boards' lamps show the state to a person who sees no page.
 
 use control_core::event::Fault;
+use emulator::board::{MILLISECOND, Wiring};
 use link::Command;
-use tests::board::{MILLISECOND, Wiring};
 use tests::rig::Rig;
 
 #[test]

@@ -1,8 +1,8 @@
 //! The firmware's log over RTT is readable with its image alone: the bytes decoded as `defmt`.
 
-use tests::board::log::Log;
-use tests::board::tilt::Health;
-use tests::board::{Board, MILLISECOND, firmware_path, plant};
+use emulator::board::log::Log;
+use emulator::board::tilt::Health;
+use emulator::board::{Board, MILLISECOND, firmware_path, plant};
 use tests::rig::{Rig, task};
 use tests::scenario::board;
 

@@ -2,10 +2,10 @@
 //! asks for it, and counts once a reset has loaded it.
 
 use control_core::interlock::Interlock;
+use emulator::board::Wiring;
+use emulator::board::flash::{FACTORY_OPTIONS, GUARDED_OPTIONS, OptionFault};
 use link::Command;
 use link::frames::{CommandRefusal, GuardRefusal};
-use tests::board::Wiring;
-use tests::board::flash::{FACTORY_OPTIONS, GUARDED_OPTIONS, OptionFault};
 use tests::rig::Rig;
 
 /// A shadow that users have reported: read protection, and every reserved bit but two.

@@ -1,9 +1,9 @@
 //! The boards' own test (`firmware/tests/board.rs`), wired as it says and with its cable in a PC:
 //! the same program that `cargo xtask board-test` flashes, each of its tests after a reset.
 
-use tests::board::log::Log;
-use tests::board::semihosting::{self, Host};
-use tests::board::{Board, Wiring, flash, image_for, plant};
+use emulator::board::log::Log;
+use emulator::board::semihosting::{self, Host};
+use emulator::board::{Board, Wiring, flash, image_for, plant};
 
 /// The status of a test that has ended well, and that of one that has not.
 const PASSED: u32 = 0;

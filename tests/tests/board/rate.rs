@@ -1,7 +1,7 @@
 //! Ten thousand ticks a second, each in time, none lost, whatever the PC does meanwhile.
 
+use emulator::board::{Board, Nanos, Output, Wiring};
 use link::Command;
-use tests::board::{Board, Nanos, Output, Wiring};
 use tests::pc::Pc;
 use tests::scenario::{board_wired, venepuncture};
 

@@ -3,11 +3,11 @@
 
 use control_core::excitation::{Excitation, Servo, Signal};
 use control_core::units::{Damping, Millimetres, MillinewtonMetres, Stiffness};
+use emulator::board::{Board, EncoderRead, HandlerRun, Log, Output, Wiring, firmware_path, plant};
 use fixed::types::{I8F24, I16F16};
 use link::Command;
 use std::fs;
 use std::path::Path;
-use tests::board::{Board, EncoderRead, HandlerRun, Log, Output, Wiring, firmware_path, plant};
 use tests::pc::Pc;
 use tests::rig::Rig;
 

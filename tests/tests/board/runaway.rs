@@ -3,10 +3,10 @@
 
 use control_core::event::Fault;
 use control_core::interlock::Interlock;
+use emulator::board::wires::{Wire, Wires};
+use emulator::board::{Amplifier, Board, Effect, MILLISECOND, Nanos, Wiring};
 use link::Command;
 use link::frames::{CommandRefusal, EventKind};
-use tests::board::wires::{Wire, Wires};
-use tests::board::{Amplifier, Board, Effect, MILLISECOND, Nanos, Wiring};
 use tests::needle::Needle;
 use tests::pc::Pc;
 use tests::rig::{Rig, ZERO_TORQUE, task};

@@ -4,16 +4,16 @@
 use control_core::Config;
 use control_core::event::{Fault, State};
 use control_core::interlock::Interlock;
+use emulator::board::pins::{Clock, DISCOVERY, NUCLEO_F429ZI, Pins};
+use emulator::board::wires::{Wire, Wires};
+use emulator::board::{Amplifier, Board, Effect, MILLISECOND, Nanos, Wiring, image_for, plant};
+use emulator::usb_host::Port;
 use link::Command;
 use link::frames::CommandRefusal;
-use tests::board::pins::{Clock, DISCOVERY, NUCLEO_F429ZI, Pins};
-use tests::board::wires::{Wire, Wires};
-use tests::board::{Amplifier, Board, Effect, MILLISECOND, Nanos, Wiring, image_for, plant};
 use tests::follow::follows;
 use tests::pc::Pc;
 use tests::rig::{Rig, ZERO_TORQUE, task};
 use tests::scenario::{board_wired, venepuncture};
-use tests::usb_host::Port;
 
 /// A fault that a tick can see ends within two ticks; looking at the pins adds 10 µs.
 const TWO_TICKS: Nanos = 210_000;

@@ -5,12 +5,12 @@ use control_core::Config;
 use control_core::excitation::{Excitation, Servo, Signal};
 use control_core::interlock::Interlock;
 use control_core::units::{Damping, Millimetres, MillinewtonMetres, Stiffness};
+use emulator::board::pins::{DISCOVERY, NUCLEO_F429ZI};
+use emulator::board::wires::Wires;
+use emulator::board::{Board, MILLISECOND, Wiring, elf, firmware_path, image_for, plant};
 use fixed::types::{I8F24, I16F16};
 use link::Command;
 use link::frames::{CommandRefusal, EventKind, SaveError, Stage};
-use tests::board::pins::{DISCOVERY, NUCLEO_F429ZI};
-use tests::board::wires::Wires;
-use tests::board::{Board, MILLISECOND, Wiring, elf, firmware_path, image_for, plant};
 use tests::rig::Rig;
 use tests::scenario::{board, board_wired};
 

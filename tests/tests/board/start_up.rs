@@ -1,7 +1,7 @@
 //! Faults before the first tick: a peripheral that hangs, and states that a reset leaves.
 
+use emulator::board::{MILLISECOND, Wiring, plant};
 use link::frames::EventKind;
-use tests::board::{MILLISECOND, Wiring, plant};
 use tests::rig::Rig;
 use tests::scenario::board_wired;
 

@@ -2,10 +2,10 @@
 
 use control_core::event::Fault;
 use control_core::{Config, Device};
+use emulator::board::flash::PROGRAM_NANOS;
+use emulator::board::{Board, Wiring, plant};
 use link::Command;
 use link::crash::CrashKind;
-use tests::board::flash::PROGRAM_NANOS;
-use tests::board::{Board, Wiring, plant};
 use tests::laws;
 use tests::pc::Pc;
 use tests::rig::{Rig, task};

@@ -9,10 +9,10 @@ use control_core::event::{Fault, Limits};
 use control_core::units::{
     Damping, FrictionPerMillimetre, JogCompliance, Millimetres, MillinewtonMetres, Newtons, Stiffness,
 };
+use emulator::board::{Board, Drive, MILLISECOND, Nanos, plant};
 use fixed::types::I16F16;
 use link::Command;
 use link::frames::EventKind;
-use tests::board::{Board, Drive, MILLISECOND, Nanos, plant};
 use tests::pc::Pc;
 use tests::rig::ZERO_TORQUE;
 use tests::scenario::board;

@@ -1,13 +1,13 @@
 //! The cable: enumeration, both byte streams, sleep, and the plug pulled and put back, against the
 //! flash image.
 
+use emulator::board::{MILLISECOND, Wiring, plant};
+use emulator::usb_host::Port;
 use link::Command;
 use link::frames::EventKind;
-use tests::board::{MILLISECOND, Wiring, plant};
 use tests::pc::Pc;
 use tests::rig::Rig;
 use tests::scenario::board;
-use tests::usb_host::Port;
 
 #[test]
 fn a_pc_finds_a_serial_port_with_the_devices_name() {

@@ -4,6 +4,7 @@
 use crate::board_session::{ACTS, uncommissioned};
 use crate::update::{carry_out, dfuse, image};
 use board_wasm::dfu::Next;
+use emulator::bootloader::{Bootloader, FLASH, MEMORY};
 use lab::commission::bench::Line;
 use lab::commission::mechanism::VirtualLine;
 use link::Command;
@@ -12,7 +13,6 @@ use link::frames::HostFrame;
 use serde_json::{Value, json};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
-use tests::bootloader::{Bootloader, FLASH, MEMORY};
 use tests::browser::{Chromium, Error, Page, Places, check};
 
 const SOME_TIME: Duration = Duration::from_secs(60);

@@ -14,7 +14,7 @@ const LANGUAGES: [&str; 3] = ["en", "de", "fr"];
 const PUT_TOGETHER: [&str; 6] = ["figure.", "state.", "tissue.", "task.", "said.", "unit."];
 
 fn page_folder() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../host-sim/page")
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../host-sim/page/js")
 }
 
 /// The texts of a language by their keys.

@@ -2,7 +2,7 @@
 //! what it refuses.
 
 use board_wasm::dfu::{Next, Update};
-use tests::bootloader::{Bootloader, FLASH, MEMORY, OLD};
+use emulator::bootloader::{Bootloader, FLASH, MEMORY, OLD};
 
 /// An image that ends within a block and within a sector.
 pub(crate) fn image() -> Vec<u8> {

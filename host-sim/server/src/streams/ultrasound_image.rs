@@ -3,8 +3,8 @@
 
 use super::feed::Snapshot;
 use device_sim::session::{ProbeView, Scene};
-use page_wasm::drawn::TISSUES;
-use page_wasm::picture::Picture;
+use picture_wasm::drawn::TISSUES;
+use picture_wasm::picture::Picture;
 use std::io;
 use std::sync::Arc;
 use std::time::{Duration, Instant};

@@ -1,4 +1,4 @@
-//! The files of `host-sim/page`, inside the program: the page needs no disk and no network.
+//! The files of `host-sim/page/js`, inside the program: the page needs no disk and no network.
 
 /// A file as it is served.
 pub(super) struct Asset {
@@ -15,7 +15,7 @@ macro_rules! asset {
         Asset {
             path: $path,
             content_type: $content_type,
-            body: include_bytes!(concat!("../../../page/", $file)),
+            body: include_bytes!(concat!("../../../page/js/", $file)),
         }
     };
 }

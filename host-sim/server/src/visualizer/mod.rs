@@ -5,7 +5,7 @@
 //! [`device_sim::page::condense`] turns 10 kHz into what a picture needs, `server` and `connection`
 //! carry it, `watched` carries a page that only looks (a class) or agrees to steps (a guide),
 //! `debrief` serves what it is given for the last recording, `assets` holds the files of
-//! `host-sim/page`.
+//! `host-sim/page/js`.
 //!
 //! This module may not touch the device, the link or a recording: it knows a
 //! [`device_sim::session::Session`] and nothing behind it. A page that is slow, asleep or gone

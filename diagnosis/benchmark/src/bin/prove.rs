@@ -3,10 +3,10 @@
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    let options = match proof::Options::parse(std::env::args().skip(1)) {
+    let options = match benchmark::Options::parse(std::env::args().skip(1)) {
         Ok(Some(options)) => options,
         Ok(None) => {
-            print!("{}", proof::HELP);
+            print!("{}", benchmark::HELP);
             return ExitCode::SUCCESS;
         }
         Err(message) => {
@@ -14,7 +14,7 @@ fn main() -> ExitCode {
             return ExitCode::from(2);
         }
     };
-    match proof::run(&options) {
+    match benchmark::run(&options) {
         Ok(()) => ExitCode::SUCCESS,
         Err(message) => {
             eprintln!("{message}");

@@ -1,4 +1,4 @@
-// The WebAssembly behind this page: bytes and texts in and out. board-wasm/src/lib.rs is the other side.
+// The WebAssembly behind this page: bytes and texts in and out. host-sim/page/board-wasm/src/lib.rs is the other side.
 
 import { bytes } from "./bytes.js";
 

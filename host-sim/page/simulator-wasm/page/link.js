@@ -1,5 +1,5 @@
 // The device in the page itself, in the place of the WebSocket: the control core and the plant as WebAssembly, the same
-// messages. site-wasm/src/lib.rs is the other side.
+// messages. host-sim/page/simulator-wasm/src/lib.rs is the other side.
 
 import { bytes } from "./bytes.js";
 

@@ -184,7 +184,7 @@ impl std::error::Error for Refused {}
 pub fn firmware_path() -> PathBuf {
     const DEFAULT: &str = "target/thumbv7em-none-eabihf/firmware/firmware";
     std::env::var_os("FIRMWARE_ELF")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(DEFAULT), PathBuf::from)
+        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").join(DEFAULT), PathBuf::from)
 }
 
 /// Returns the path of a board's image: in the folder of the default board's.

@@ -1,8 +1,8 @@
-// Tissue and ultrasound as page-wasm computes them; page-wasm/src/lib.rs is the other side and documents each function.
+// Tissue and ultrasound as picture-wasm computes them; host-sim/page/picture-wasm/src/lib.rs is the other side and documents each function.
 
 import { bytes } from "./bytes.js";
 
-/** By the numbers of page-wasm; 7 to 9 are vessels. */
+/** By the numbers of picture-wasm; 7 to 9 are vessels. */
 export const TISSUES = ["skin", "fat", "muscle", "other", "bursa", "tendon", "cartilage", "lumen", "lumen", "lumen"];
 const VESSEL = 7;
 const FAR_WALL = 8;
@@ -10,7 +10,7 @@ export const KINDS = { skinBehind: 0, skinBefore: 1, section: 2, vesselBehind: 3
 export const LINES = 256;
 export const SAMPLES = 1024;
 export const SLICES = 64;
-/** The part of the limb along the insertion that is drawn, as in tissue/src/configuration.rs. */
+/** The part of the limb along the insertion that is drawn, as in host-sim/picture/tissue/src/configuration.rs. */
 export const ALONG_MM = [-9.1, 26];
 export const HALF_WIDTH_MM = 10.4;
 export const LIMB_RADIUS_MM = 42;

@@ -1,5 +1,5 @@
 // A board on a serial port of the browser: opens it, carries bytes both ways, and closes it. What is sent is decided in
-// board-wasm/src/session.rs; a port that is opened again begins with nothing of what was before.
+// host-sim/page/board-wasm/src/session.rs; a port that is opened again begins with nothing of what was before.
 
 import * as core from "./core.js";
 

@@ -3,7 +3,7 @@
 //!
 //! The page writes numbers to [`input`], calls [`build`], then [`step`] for each picture and
 //! [`image`] for each ultrasound image; what it draws it reads from the memory that the pointers
-//! show, anew after every call that may allocate. `host-sim/page/picture.js` is the other side.
+//! show, anew after every call that may allocate. `host-sim/page/js/picture.js` is the other side.
 //! Everything that thinks is in [`picture`].
 //!
 //! The names are exported as they stand, which the language counts as unsafe, and in the browser

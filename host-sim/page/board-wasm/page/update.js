@@ -1,4 +1,4 @@
-// The update over WebUSB: carries out the transfers that board-wasm/src/dfu decides on, and shows how far it is.
+// The update over WebUSB: carries out the transfers that host-sim/page/board-wasm/src/dfu decides on, and shows how far it is.
 
 import * as core from "./core.js";
 
