@@ -5,12 +5,14 @@
 //! A file uses another if its code, tests aside, names something that the other defines. A name
 //! that a module only hands on (`pub use`) belongs to the file that defines it. A module and the
 //! modules that it is made of are one house: what it uses of them is no arrow, what they use of it
-//! is one. Crates of the PC's side have eight floors at most.
+//! is one. Crates of the PC's side have eight floors at most. Between crates, [`rooms`] says which
+//! top folder may use which.
 
 mod floors;
 mod included;
 mod krate;
 mod lengths;
+mod rooms;
 mod source;
 
 use crate::shell::{self, Error};
@@ -53,19 +55,22 @@ pub(crate) fn check() -> Result<(), Error> {
         long.extend(lengths::too_long_in_script(&text).iter().map(|one| one.message(&file)));
     }
     let included = included::unlisted(&shell::top()).map_err(unreadable)?;
-    circles.iter().chain(&long).chain(&included).chain(&high).for_each(|one| eprintln!("{one}"));
+    let back = rooms::wrong(&shell::top()).map_err(unreadable)?;
+    let all = [&circles, &long, &included, &high, &back];
+    all.into_iter().flatten().for_each(|one| eprintln!("{one}"));
     if count < FEWEST_USES {
         return Err(Error::new(format!("only {count} uses were seen: the reader of sources is blind")));
     }
-    if circles.is_empty() && long.is_empty() && included.is_empty() && high.is_empty() {
+    if all.iter().all(|found| found.is_empty()) {
         return Ok(());
     }
     Err(Error::new(format!(
-        "{} circles, each printed above: move what both files need into a file below them; {} functions that are too long; {} includes; {} crates that are too high",
+        "{} circles, each printed above: move what both files need into a file below them; {} functions that are too long; {} includes; {} crates that are too high; {} arrows between rooms that lead back",
         circles.len(),
         long.len(),
         included.len(),
-        high.len()
+        high.len(),
+        back.len()
     )))
 }
 
