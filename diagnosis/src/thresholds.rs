@@ -4,7 +4,7 @@
 //!
 //! Shares are parts of the refit's mean square above the noise; z is a gain over its standard
 //! error; nats are log-likelihood. Where no other source is given a number was set by hand on
-//! development seeds of `cargo xtask prove`; docs/diagnosis-measured.md says how that fares.
+//! development seeds of `cargo xtask prove`; docs/measured/diagnosis.md says how that fares.
 
 use std::ops::Range;
 
@@ -145,7 +145,7 @@ pub(crate) const MISTAKEN: f64 = 0.2;
 
 /// Residual of a model, over that of a motion read in whole counts, from which other physics
 /// limits, not noise, and shares decide: it is 1.9 in the median on generated nulls and 22 on axes
-/// of real machines (`docs/diagnosis-measured.md`).
+/// of real machines (`docs/measured/diagnosis.md`).
 pub(crate) const LIMITED_BY_PHYSICS: f64 = 3.0;
 /// The same of the refit, below which noise is all there is, and what was found needs no share.
 pub(crate) const LEAVES_SOMETHING: f64 = 2.0;

@@ -138,7 +138,7 @@ mod tests {
 
     #[test]
     fn the_supply_is_high_enough_and_guarded(parts: Parts) {
-        assert!(!chip::is_falling(), "the supply is below 2.66 V: see Power in docs/hardware.md");
+        assert!(!chip::is_falling(), "the supply is below 2.66 V: see Power in docs/guide/hardware.md");
         assert!(
             !parts.supply_level.is_low(),
             "the brown-out reset is off, as on a new part: host-sim commission sets it"

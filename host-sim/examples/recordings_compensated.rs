@@ -3,12 +3,13 @@
 //!
 //!     cargo run --release -p host-sim --example recordings_compensated -- RECORDINGS [CASE…]
 //!
-//! A case is `emps`, `anticogging` or a folder of `machines`. `docs/recordings.md` says where they
-//! come from. The force that a machine needs apart from its inertia is `gain·u − J·a + external`;
-//! what is fed forward is the law of `docs/compensation.md` with the usual gains, in floating
-//! point. The raw map is the mean of that force over 64 places of a turn (or of the travel) and
-//! both directions, at a gain of 1. Neither knows where a held-out recording begins: the place is
-//! fitted on its first two fifths, and the rest judges. Rows that hardly move do not count.
+//! A case is `emps`, `anticogging` or a folder of `machines`. `docs/measured/recordings.md` says
+//! where they come from. The force that a machine needs apart from its inertia is `gain·u − J·a +
+//! external`; what is fed forward is the law of `docs/guide/compensation.md` with the usual gains,
+//! in floating point. The raw map is the mean of that force over 64 places of a turn (or of the
+//! travel) and both directions, at a gain of 1. Neither knows where a held-out recording begins:
+//! the place is fitted on its first two fifths, and the rest judges. Rows that hardly move do not
+//! count.
 
 use diagnosis::effects::{Effect, EffectName};
 use diagnosis::recording::Recording;

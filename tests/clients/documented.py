@@ -1,4 +1,4 @@
-"""The clients of docs/streams.md as they stand there, against the program: the Python text, and the C# text with Mono.
+"""The clients of docs/guide/streams.md as they stand there, against the program: the Python text, and the C# text with Mono.
 
 Run by `cargo xtask test clients` with host-sim's path; everything is on loopback. Only the port is another one.
 """
@@ -9,7 +9,7 @@ import subprocess
 import sys
 import tempfile
 
-PAGE = pathlib.Path(__file__).parents[2] / "docs/streams.md"
+PAGE = pathlib.Path(__file__).parents[2] / "docs/guide/streams.md"
 USUAL = "127.0.0.1:8711"
 LINES = 20
 SAID = re.compile(r"^ *-?\d+[.,]\d\d mm +-?\d+[.,]\d\d N +\w+$")

@@ -1,4 +1,4 @@
-"""The bodies of docs/anatomy.md by another method: each structure is an implicit function, negative inside, and the needle's way is sampled
+"""The bodies of docs/design/anatomy.md by another method: each structure is an implicit function, negative inside, and the needle's way is sampled
 densely. Nothing is solved for a crossing, and no figure is read from the program.
 
 The limb's frame: x along the limb away from the trunk, y to its side, z down; its axis is at y = z = 0. `turn` is about x.

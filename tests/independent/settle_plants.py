@@ -2,7 +2,7 @@
 
     python3 settle_plants.py --rig rig.toml --seed N --count K --out DIR
 
-writes DIR/plant-000.toml and so on, and DIR/key.json. The author knew the formats of `docs/diagnosis.md` and of the
+writes DIR/plant-000.toml and so on, and DIR/key.json. The author knew the formats of `docs/guide/diagnosis.md` and of the
 contracts, and read nothing of the experiment, the laboratory, the proof or the diagnosis: how the experiments are designed,
 which laws are fitted and how sizes are drawn there is unknown here. Never give the tool the key.
 

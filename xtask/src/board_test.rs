@@ -11,7 +11,7 @@ pub(crate) fn run(board: &Board) -> Result<(), Error> {
     if let Some(why) = missing() {
         println!("board-test: DID NOT RUN: {why}");
         println!(
-            "It needs a board, {}, on a debug probe, wired as firmware/tests/board.rs says; see docs/hardware.md.",
+            "It needs a board, {}, on a debug probe, wired as firmware/tests/board.rs says; see docs/guide/hardware.md.",
             board.title
         );
         return Ok(());

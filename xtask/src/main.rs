@@ -49,7 +49,7 @@ The project's chores.
   cargo xtask dist              both boards' images (ELF, BIN, DFU) and the program for this PC, to hand on: target/dist
   cargo xtask wasm              builds what the page computes in the browser, into host-sim/page/js
   cargo xtask site              the whole simulator as one folder without a server: target/site
-  cargo xtask wiring            draws both boards' wiring from the tables in docs/hardware.md
+  cargo xtask wiring            draws both boards' wiring from the tables in docs/guide/hardware.md
   cargo xtask board-test        the image's hardware, on a real board; says so where there is none
   cargo xtask bench [ROW…]      measures, prints the table and writes target/bench.json
   cargo xtask counts            the instructions of hot paths against those written down; --renew writes them down,

@@ -1,5 +1,6 @@
-//! The tests on recordings of real machines (`docs/recordings.md`). The recordings are not part of
-//! the repository: a test whose recordings are absent is left out, and the summary names it.
+//! The tests on recordings of real machines (`docs/measured/recordings.md`). The recordings are not
+//! part of the repository: a test whose recordings are absent is left out, and the summary names
+//! it.
 
 use crate::shell;
 use std::path::PathBuf;
@@ -38,8 +39,10 @@ impl RealTest {
 
     /// Returns the test's name and the reason why it does not run.
     pub(crate) fn not_run(&self) -> (String, String) {
-        let why =
-            format!("there is no folder {}; docs/recordings.md has the sources", self.folder().display());
+        let why = format!(
+            "there is no folder {}; docs/measured/recordings.md has the sources",
+            self.folder().display()
+        );
         (self.path(), why)
     }
 }

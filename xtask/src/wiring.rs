@@ -1,5 +1,5 @@
-//! Draws each board's wiring from the pin table in `docs/hardware.md`: what the table says is what
-//! the picture shows.
+//! Draws each board's wiring from the pin table in `docs/guide/hardware.md`: what the table says is
+//! what the picture shows.
 //!
 //! `tests/tests/board/wiring.rs` compares the same table with the pins that the emulated board
 //! drives, and so with the image.
@@ -9,11 +9,11 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::PathBuf;
 
-const PAGE: &str = "docs/hardware.md";
+const PAGE: &str = "docs/guide/hardware.md";
 /// A board's section of the page, its title, and its picture.
 const PICTURES: [(&str, &str, &str); 2] = [
-    ("## Wiring", "STM32F4DISCOVERY", "docs/wiring-discovery.svg"),
-    ("## The second board: NUCLEO-F429ZI", "NUCLEO-F429ZI", "docs/wiring-nucleo-f429zi.svg"),
+    ("## Wiring", "STM32F4DISCOVERY", "docs/guide/wiring-discovery.svg"),
+    ("## The second board: NUCLEO-F429ZI", "NUCLEO-F429ZI", "docs/guide/wiring-nucleo-f429zi.svg"),
 ];
 
 /// Pixels of the picture: its width, a row's height, the board's left and right edge, where the

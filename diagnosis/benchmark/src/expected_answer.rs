@@ -1,6 +1,6 @@
 //! Real machines: nobody knows what is in them, so an answer is judged against the effects that
 //! their sources report and least squares found. `believed.tsv` has one line a case; the rules are
-//! in `docs/benchmark.md`.
+//! in `docs/design/benchmark.md`.
 
 use crate::judge::Record;
 

@@ -1,4 +1,4 @@
-//! Folders of cases that somebody else made, with their layout (`docs/benchmark.md`).
+//! Folders of cases that somebody else made, with their layout (`docs/design/benchmark.md`).
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -123,7 +123,7 @@ fn keys(top: &Path) -> Result<BTreeMap<String, Truth>, String> {
         return Ok(beliefs(top)?.into_iter().map(|(id, belief)| (id, Truth::Believed(belief))).collect());
     }
     Err(format!(
-        "{} has neither key.json nor believed.tsv, so its cases cannot be judged; docs/benchmark.md describes the format",
+        "{} has neither key.json nor believed.tsv, so its cases cannot be judged; docs/design/benchmark.md describes the format",
         top.display()
     ))
 }

@@ -1,4 +1,4 @@
-//! Opens the key: one answer against what was hidden. The rules are in `docs/benchmark.md`.
+//! Opens the key: one answer against what was hidden. The rules are in `docs/design/benchmark.md`.
 
 use crate::baselines::Opinion;
 use crate::key::{Category, Key};

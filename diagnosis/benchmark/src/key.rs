@@ -1,4 +1,4 @@
-//! The key of a case, as its author wrote it, and its file format: `docs/benchmark.md`.
+//! The key of a case, as its author wrote it, and its file format: `docs/design/benchmark.md`.
 //!
 //! Whoever generates cases, this project or others, hands the judge these and nothing else.
 

@@ -119,7 +119,7 @@ pub const HELP: &str = "prove: the blinded benchmark of the diagnosis
   --only TEXT   only cases whose kind or hidden physics contains TEXT; `speed` for the time of a minute at 10 kHz; with --settle
                 also the folder of one plant, such as plant-5
   --cases-from DIR  judge the cases of a folder with its key.json or believed.tsv and draw none; again for more folders.
-                    docs/benchmark.md tells the format
+                    docs/design/benchmark.md tells the format
   --inject DIR  conceal known effects in the recordings of real machines of a folder (a folder a machine, with rig.toml,
                 fit*.csv and holdout*.csv; of other names the last judges) and judge these; again for more folders.
                 --cases K: K effects in all (44)

@@ -1,6 +1,6 @@
 //! The diagnosis for Python. Rigs come as TOML and recordings as CSV, in the forms of
-//! `docs/recordings.md`, so that Python and the command line refuse the same things with the same
-//! sentences; the Python side turns frames and files into them. Nothing here computes.
+//! `docs/measured/recordings.md`, so that Python and the command line refuse the same things with
+//! the same sentences; the Python side turns frames and files into them. Nothing here computes.
 
 use convert::import;
 use diagnosis::recording::Recording;

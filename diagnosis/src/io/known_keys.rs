@@ -1,6 +1,6 @@
 //! The keys of a rig file: one that is misspelt is named with the nearest that is known.
 
-/// Tables and their keys, as docs/files.md has them.
+/// Tables and their keys, as docs/guide/files.md has them.
 const KEYS: [(&str, &[&str]); 5] = [
     ("", &["format", "name", "kind", "model", "uncertainty", "actuator", "encoder", "effect"]),
     ("model", &["inertia", "viscous", "coulomb", "offset", "weight", "gravity", "gravity_zero"]),
@@ -65,9 +65,10 @@ mod tests {
     /// The example of the documentation has every key, and can be read.
     #[test]
     fn the_documented_rig_has_every_key() {
-        let page = include_str!("../../../docs/files.md");
+        let page = include_str!("../../../docs/guide/files.md");
         let example = page.split("```").nth(1).and_then(|block| block.strip_prefix("toml"));
-        let rig = crate::rig::Rig::parse(example.expect("a rig"), "docs/files.md").expect("it can be read");
+        let rig =
+            crate::rig::Rig::parse(example.expect("a rig"), "docs/guide/files.md").expect("it can be read");
         assert_eq!(rig.effects.len(), 1);
         let table: toml::Table = example.expect("a rig").parse().expect("it is TOML");
         for (name, keys) in KEYS {

@@ -184,7 +184,10 @@ impl Rig {
         let rig: Self = toml::from_str(text).map_err(|cause| {
             let line =
                 cause.span().map_or(1, |span| text[..span.start.min(text.len())].matches('\n').count() + 1);
-            InputError::new(format!("{file}, line {line}: {}; docs/files.md has every key", cause.message()))
+            InputError::new(format!(
+                "{file}, line {line}: {}; docs/guide/files.md has every key",
+                cause.message()
+            ))
         })?;
         rig.check().map_err(|what| InputError::new(format!("{file}: {what}")))?;
         Ok(rig)

@@ -1,6 +1,6 @@
-//! The diagnosis on recordings of real machines (`docs/recordings.md`), which are not part of the
-//! repository. A test fails where its recordings are absent; `cargo xtask test` leaves it out there
-//! and names it as not run.
+//! The diagnosis on recordings of real machines (`docs/measured/recordings.md`), which are not part
+//! of the repository. A test fails where its recordings are absent; `cargo xtask test` leaves it
+//! out there and names it as not run.
 
 use diagnosis::effects::EffectName;
 use diagnosis::recording::Recording;
@@ -13,7 +13,7 @@ fn recorded(name: &str) -> PathBuf {
     let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared/recordings").join(name);
     assert!(
         path.is_dir(),
-        "{} is absent; convert the recordings as docs/recordings.md says, or run `cargo xtask test`, which leaves this test out",
+        "{} is absent; convert the recordings as docs/measured/recordings.md says, or run `cargo xtask test`, which leaves this test out",
         path.display()
     );
     path

@@ -23,7 +23,7 @@ pub(crate) struct OnChipDac(C1);
 impl OnChipDac {
     /// At zero torque from the first moment that it is on. The buffer is off: it would end 0.2 V
     /// from either rail (DS8626, DAC characteristics), where full torque is; a follower is outside
-    /// (`docs/hardware.md`).
+    /// (`docs/guide/hardware.md`).
     pub(crate) fn new(mut channel: C1) -> Self {
         // SAFETY: `C1` stands for channel 1, whose bits alone are changed; channel 2 is not used.
         let control = unsafe { &*DAC::ptr() }.cr();

@@ -55,9 +55,9 @@ unsafe impl UsbPeripheral for Core {
 
 /// The test identity of pid.codes. Its rule: anybody's, for tests in their own house, and never on
 /// a device that is handed on, sold or manufactured. Who does that asks pid.codes for a product
-/// number, free for open hardware, and writes it here and into the udev rule of `docs/hardware.md`.
-/// V-USB's shared 16C0:27DD is no alternative: its serial number has to begin with a domain or an
-/// address that its maker owns.
+/// number, free for open hardware, and writes it here and into the udev rule of
+/// `docs/guide/hardware.md`. V-USB's shared 16C0:27DD is no alternative: its serial number has to
+/// begin with a domain or an address that its maker owns.
 const VENDOR_AND_PRODUCT: UsbVidPid = UsbVidPid(0x1209, 0x0001);
 const MANUFACTURER: &str = "Needle insertion simulator";
 const PRODUCT: &str = "Needle device";

@@ -14,7 +14,7 @@ use training::xapi::statements;
 /// Print a trainee's figures for every insertion and in total: time, path, force, vessel, angle,
 /// smoothness.
 ///
-/// docs/training.md explains each figure.
+/// docs/guide/training.md explains each figure.
 #[derive(Args)]
 #[command(after_help = examples!("Example: host-sim score session.mcap --profile adult"))]
 pub struct Score {

@@ -1,5 +1,5 @@
 //! `compensate` on the virtual device, whose mechanism has forces that only the diagnosis has
-//! found. Both rigs are those that the tests on the board use; `docs/compensation.md` has the
+//! found. Both rigs are those that the tests on the board use; `docs/guide/compensation.md` has the
 //! commands that made them.
 
 use control_core::Device;

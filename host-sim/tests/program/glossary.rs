@@ -1,4 +1,5 @@
-//! docs/glossary.md has every verdict, fault and refusal, in the words that the program prints.
+//! docs/guide/glossary.md has every verdict, fault and refusal, in the words that the program
+//! prints.
 
 use control_core::Refusal;
 use control_core::event::Fault;
@@ -9,7 +10,7 @@ use diagnosis::Verdict;
 use fixed::types::I16F16;
 use link::frames::{CommandRefusal, GuardRefusal, SaveError};
 
-const GLOSSARY: &str = include_str!("../../../docs/glossary.md");
+const GLOSSARY: &str = include_str!("../../../docs/guide/glossary.md");
 
 /// The rows of the table under a heading.
 fn rows(heading: &str) -> Vec<&'static str> {

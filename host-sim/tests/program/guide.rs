@@ -1,5 +1,5 @@
-//! The commands of docs/diagnosis.md and docs/training.md are run exactly as written, and print
-//! what the guide says.
+//! The commands of docs/guide/diagnosis.md and docs/guide/training.md are run exactly as written,
+//! and print what the guide says.
 
 use crate::common::{folder, text};
 use diagnosis::rig::Rig;
@@ -7,9 +7,9 @@ use diagnosis::simulation::{Plant, Surroundings};
 use std::path::Path;
 use std::process::Command;
 
-const TRAINING: &str = include_str!("../../../docs/training.md");
-const SETTLE: &str = include_str!("../../../docs/settle.md");
-const GUIDE: &str = include_str!("../../../docs/diagnosis.md");
+const TRAINING: &str = include_str!("../../../docs/guide/training.md");
+const SETTLE: &str = include_str!("../../../docs/guide/settle.md");
+const GUIDE: &str = include_str!("../../../docs/guide/diagnosis.md");
 /// The largest difference between a figure of the guide and the printed one, as a ratio.
 const FIGURES_WITHIN: f64 = 0.2;
 

@@ -1,4 +1,4 @@
-//! `docs/papers.md`: no row of the audit is missing, and every test that a row names exists.
+//! `docs/design/papers.md`: no row of the audit is missing, and every test that a row names exists.
 
 use std::path::Path;
 
@@ -11,7 +11,7 @@ fn top() -> &'static Path {
 
 /// The rows of each paper's table, as number, feature, state and evidence.
 fn tables() -> Vec<Vec<[String; 4]>> {
-    let page = std::fs::read_to_string(top().join("docs/papers.md")).expect("it is there");
+    let page = std::fs::read_to_string(top().join("docs/design/papers.md")).expect("it is there");
     let part = |heading: &str| {
         let from = page.find(heading).unwrap_or_else(|| panic!("{heading} is missing"));
         let rest = &page[from + heading.len()..];
@@ -51,7 +51,7 @@ fn every_row_is_there_and_has_a_test_or_a_reason() {
 
 #[test]
 fn the_rows_are_counted_right() {
-    let page = std::fs::read_to_string(top().join("docs/papers.md")).expect("it is there");
+    let page = std::fs::read_to_string(top().join("docs/design/papers.md")).expect("it is there");
     for (table, (heading, _)) in tables().iter().zip(ROWS) {
         let count = |wanted: &str| table.iter().filter(|row| row[2] == wanted).count();
         let paper = heading.trim_start_matches("## Paper ");

@@ -1,5 +1,5 @@
-//! docs/safety.md and docs/diagnosis-design.md name tests and CONTRIBUTING.md files: each is where
-//! it says.
+//! docs/design/safety.md and docs/design/diagnosis.md name tests and CONTRIBUTING.md files: each is
+//! where it says.
 
 use std::path::{Path, PathBuf};
 
@@ -26,7 +26,7 @@ fn named<'a>(line: &'a str, of_table: Option<&'a str>) -> Vec<(&'a str, &'a str)
 #[test]
 fn every_test_that_the_page_names_is_there() {
     let top = Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("a workspace");
-    let page = std::fs::read_to_string(top.join("docs/safety.md")).expect("the page");
+    let page = std::fs::read_to_string(top.join("docs/design/safety.md")).expect("the page");
     // Within a table: the file that its head names, if it does.
     let (mut table, mut seen): (Option<Option<&str>>, u32) = (None, 0);
     for line in page.lines() {
@@ -67,7 +67,7 @@ fn sources(folder: PathBuf) -> String {
 #[test]
 fn every_test_that_the_diagnosis_design_names_is_there() {
     let top = Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("a workspace");
-    let page = std::fs::read_to_string(top.join("docs/diagnosis-design.md")).expect("the page");
+    let page = std::fs::read_to_string(top.join("docs/design/diagnosis.md")).expect("the page");
     let (_, table) = page.split_once("| fault | test |").expect("its table");
     let rows = table.split("\n\n").next().unwrap_or_default();
     let code = sources(top.join("diagnosis/src")) + &sources(top.join("diagnosis/tests"));

@@ -1,6 +1,6 @@
 //! Compensation cancels the mechanism's own forces as they were found: on the flash image, and for
 //! a minute at rest with the same core on this machine. `fixtures/hidden-found.toml` is what the
-//! diagnosis made of `fixtures/hidden.toml` (`docs/compensation.md` has the commands).
+//! diagnosis made of `fixtures/hidden.toml` (`docs/guide/compensation.md` has the commands).
 
 use std::path::Path;
 

@@ -1,10 +1,11 @@
-//! The tables of pins in docs/hardware.md, from which the wiring diagrams are drawn, name the pins
-//! that the emulated boards drive; its analogue stage does what its text says of it.
+//! The tables of pins in docs/guide/hardware.md, from which the wiring diagrams are drawn, name the
+//! pins that the emulated boards drive; its analogue stage does what its text says of it.
 
 use emulator::board::pins::{DISCOVERY, NUCLEO_F429ZI, PartPin, Pins};
 
 fn page() -> String {
-    std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/hardware.md")).expect("the page")
+    std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/guide/hardware.md"))
+        .expect("the page")
 }
 
 /// Returns the pins in the first cell of the row of `section` whose text contains `words`.

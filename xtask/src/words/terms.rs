@@ -1,7 +1,7 @@
 //! The terms of the project, each with the words that are not used for the same thing, and names
 //! that files do not have.
 
-/// A term: one word for one thing, from code to report. `docs/glossary.md` explains more of them.
+/// A term: one word for one thing, from code to report. `docs/guide/glossary.md` explains more of them.
 pub(super) struct Term {
     pub(super) term: &'static str,
     pub(super) meaning: &'static str,

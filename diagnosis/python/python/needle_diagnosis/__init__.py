@@ -7,7 +7,7 @@
     report.effects[0].name      # such as "cogging"
     report.patched_rig          # the simulation with what was missing, as TOML
 
-Rigs and recordings have the forms of docs/recordings.md. A recording is a path, a frame, or anything that pandas makes a frame of, with
+Rigs and recordings have the forms of docs/measured/recordings.md. A recording is a path, a frame, or anything that pandas makes a frame of, with
 the columns time_s, command and position_counts.
 """
 

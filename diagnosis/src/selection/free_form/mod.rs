@@ -1,5 +1,5 @@
 //! A force of any form over given inputs, and its gain on left-out blocks: every name is checked
-//! against it. It changes no model. The method: docs/free-form.md.
+//! against it. It changes no model. The method: docs/design/free-form.md.
 
 mod basis;
 mod compare;

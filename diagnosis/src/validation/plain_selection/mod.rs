@@ -6,7 +6,7 @@
 //! the command act on the command that the nominal model predicts, never on the recorded one, which
 //! holds the noise that is to be explained. Where other physics and not noise limits, a name that
 //! both selections give is right far more often than one that only one of them gives
-//! (docs/diagnosis-measured.md).
+//! (docs/measured/diagnosis.md).
 
 mod axis;
 mod even_grid;

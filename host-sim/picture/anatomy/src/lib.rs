@@ -8,7 +8,7 @@
 //!
 //! Lengths are in mm. The limb's frame: x along the limb away from the trunk, y to its side, z
 //! down; the limb's axis is at y = z = 0. The figures of each site, with their sources, are in
-//! `docs/anatomy.md`.
+//! `docs/design/anatomy.md`.
 
 #![forbid(unsafe_code)]
 

@@ -164,8 +164,8 @@ mod tests {
         pieces.iter().map(|p| (body.structures[p.structure].name, p.from_mm)).collect()
     }
 
-    /// The figures of docs/anatomy.md straight in: 2.5 mm of skin, then fat, deltoid to 12 mm over
-    /// the bursa.
+    /// The figures of docs/design/anatomy.md straight in: 2.5 mm of skin, then fat, deltoid to 12
+    /// mm over the bursa.
     #[test]
     fn straight_in_the_layers_are_as_thick_as_the_figures_say() {
         let place = Place { along_mm: 5.0, ..STRAIGHT };

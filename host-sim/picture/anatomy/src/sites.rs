@@ -1,4 +1,4 @@
-//! The sites: their structures by the figures of `docs/anatomy.md`.
+//! The sites: their structures by the figures of `docs/design/anatomy.md`.
 
 use crate::body::{Body, Role, Structure, Tissue};
 use crate::solid::Convex;

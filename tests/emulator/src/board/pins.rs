@@ -1,5 +1,5 @@
 //! The connections of the part's pins: one value for each board that there is an image for, read
-//! from its manual and from `docs/hardware.md`, not from the firmware.
+//! from its manual and from `docs/guide/hardware.md`, not from the firmware.
 
 /// A pin of the part: its port, 0 for A, and its number in the port.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
