@@ -1,6 +1,7 @@
-"""The clients of docs/guide/streams.md as they stand there, against the program: the Python text, and the C# text with Mono.
+"""The clients of docs/guide/streams.md as they stand there, against the program: the Python text, or the C# text with Mono.
 
-Run by `cargo xtask test clients` with host-sim's path; everything is on loopback. Only the port is another one.
+Run by `cargo xtask test clients` with host-sim's path, and by `cargo xtask nightly csharp` with `csharp` after it. Everything is
+on loopback. Only the port is another one.
 """
 
 import pathlib
@@ -34,19 +35,20 @@ def check(name, command):
     print(f"documented client in {name}: pass ({lines[-1].strip()})")
 
 
-def main(program):
+def main(program, language="python"):
     command = [program, "run", "--headless", "--stream", "websocket=127.0.0.1:0"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as child, tempfile.TemporaryDirectory() as folder:
         try:
             found = re.match(r"websocket stream at ([\d.:]+)$", child.stdout.readline())
             place = pathlib.Path(folder)
-            python, csharp = place / "client.py", place / "client.cs"
-            python.write_text(text("python").replace(USUAL, found[1]), encoding="utf-8")
-            csharp.write_text(text("csharp").replace(USUAL, found[1]), encoding="utf-8")
-            # Each line at once, and not when a block of them is full.
-            check("Python", [sys.executable, "-u", python])
+            client = place / f"client.{language}"
+            client.write_text(text(language).replace(USUAL, found[1]), encoding="utf-8")
+            if language == "python":
+                # Each line at once, and not when a block of them is full.
+                check("Python", [sys.executable, "-u", client])
+                return
             built = place / "client.exe"
-            compiler = ["mcs", "-warnaserror-", "-nowarn:649", "-r:System.Runtime.Serialization.dll", f"-out:{built}", csharp]
+            compiler = ["mcs", "-warnaserror-", "-nowarn:649", "-r:System.Runtime.Serialization.dll", f"-out:{built}", client]
             subprocess.run(compiler, check=True)
             check("C#", ["mono", built])
         finally:
@@ -54,4 +56,4 @@ def main(program):
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    main(*sys.argv[1:])

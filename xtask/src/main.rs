@@ -41,7 +41,7 @@ The project's chores.
                                 fmt words arrows clippy firmware unit doc board wasm site browser clients fuzz
                                 prove
   cargo xtask test --quick      the inner loop: format, words, arrows, warnings, the tests inside the crates; three minutes
-  cargo xtask nightly [WHAT…]   what takes longer than the tests may: slow parquet foxglove class counts soak
+  cargo xtask nightly [WHAT…]   what takes longer than the tests may: slow parquet csharp foxglove class counts soak
                                 answers mutants proof
   cargo xtask firmware          builds the flash image; prints its path, flash, RAM and worst stack use
   cargo xtask flash [--dfu]     flashes it with probe-rs; --dfu: over USB, without a probe

@@ -2,6 +2,7 @@
 //! the one command that does it.
 
 use crate::shell::{self, Error};
+use crate::workspace_build::OWN_COMPILER;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -198,12 +199,13 @@ pub(crate) fn cargo_for_board(toolchain: Toolchain, subcommand: &str) -> Command
     cargo
 }
 
-/// The same where the crates of the standard library in `library` are needed.
+/// The same where the crates of the standard library in `library` are needed; by the compiler
+/// alone, as it is shipped.
 pub(crate) fn cargo_with(toolchain: Toolchain, subcommand: &str, library: &str) -> Command {
     match toolchain {
         Toolchain::Installed => {
             let mut cargo = shell::cargo();
-            cargo.arg(subcommand);
+            cargo.arg(subcommand).env_remove(OWN_COMPILER);
             cargo
         }
         Toolchain::Debian => {
@@ -212,6 +214,7 @@ pub(crate) fn cargo_with(toolchain: Toolchain, subcommand: &str, library: &str) 
             // `-Z` on a stable compiler: only the library is built with it, from the compiler's own
             // sources.
             cargo.env("RUSTC", "/usr/bin/rustc").env("RUSTC_BOOTSTRAP", "1").env_remove("RUSTUP_TOOLCHAIN");
+            cargo.env_remove(OWN_COMPILER);
             cargo.arg(subcommand).arg(format!("-Zbuild-std={library}"));
             cargo
         }

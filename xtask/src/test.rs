@@ -3,8 +3,9 @@
 
 use crate::real_recordings;
 use crate::setup;
-use crate::shell::Error;
+use crate::shell::{self, Error};
 use crate::steps::{NIGHTLY, QUICK, STEPS, TestStep};
+use crate::workspace_build::compile_by_clippy;
 use std::time::Instant;
 
 /// The space that a whole run writes into an empty target folder, and room to spare; a linker on a
@@ -31,6 +32,13 @@ pub(crate) fn run(arguments: &[String]) -> Result<(), Error> {
     let all: &[TestStep] = if quick { &QUICK } else { &STEPS };
     let chosen = choose(all, &names, "step of the tests")?;
     setup::disk(if names.is_empty() && !quick { NEEDED_MIB } else { NEEDED_BY_A_STEP_MIB })?;
+    if !quick && shell::is_on_path("clippy-driver") {
+        // SAFETY: no other thread runs yet.
+        #[allow(unsafe_code, reason = "the environment of this process is changed once, before any thread")]
+        unsafe {
+            compile_by_clippy();
+        }
+    }
     let mut summary = Summary::default();
     summary.run(&chosen);
     for step in &NIGHTLY {
