@@ -45,7 +45,7 @@ pub(crate) fn build_with_own_test(board: &Board) -> Result<(), Error> {
     let image = build_by(board, || {
         let mut cargo = setup::cargo_for_board(setup::toolchain()?, "build");
         cargo.args(arguments(board)).args(["--bin", "firmware", "--test", "board"]);
-        messages = shell::output(cargo.args(["--message-format", "json-render-diagnostics"]))?;
+        messages = shell::output(cargo.args(["--quiet", "--message-format", "json-render-diagnostics"]))?;
         Ok(())
     })?;
     // Cargo gives it a name with a hash, and says which.

@@ -9,6 +9,8 @@ use crate::{
 };
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::sync::{Mutex, PoisonError};
+use std::thread::{self, JoinHandle};
 
 /// The time for which damaged frames are parsed, in s.
 const FUZZ_SECONDS: &str = "10";
@@ -40,8 +42,8 @@ pub(crate) const STEPS: [TestStep; 14] = [
         300.0,
         build,
     ),
-    step("firmware", "the boards' flash images build, without warnings, and fit", 150.0, image),
     step("unit", "the crates' tests", 250.0, unit),
+    step("firmware", "the boards' flash images build, without warnings, and fit", 60.0, image),
     step("doc", "the documentation builds without warnings, its examples run", 60.0, doc),
     step("board", "the flash images on the emulated boards", 290.0, board),
     step("wasm", "the page's WebAssembly is built from its sources", 6.0, page_wasm),
@@ -154,8 +156,29 @@ fn slow() -> Result<(), Error> {
     shell::run(&mut tests)
 }
 
+/// Builds the images while the first steps run.
+static IMAGES_AHEAD: Mutex<Option<JoinHandle<()>>> = Mutex::new(None);
+
+/// Begins to build the images: they are linked in one piece, on one core, in a folder of their own.
+/// What fails here fails again in its step, which says why.
+pub(crate) fn build_images_ahead() -> Result<(), Error> {
+    // Installs the target where it is missing, before cargo is busy.
+    setup::toolchain()?;
+    let build = || {
+        let _ = boards::ALL.iter().try_for_each(firmware::build_with_own_test);
+    };
+    *IMAGES_AHEAD.lock().unwrap_or_else(PoisonError::into_inner) = Some(thread::spawn(build));
+    Ok(())
+}
+
+fn wait_for_images() {
+    let ahead = IMAGES_AHEAD.lock().unwrap_or_else(PoisonError::into_inner).take();
+    let _ = ahead.map(JoinHandle::join);
+}
+
 /// The image of every board, and the same warnings for it as for everything else.
 fn image() -> Result<(), Error> {
+    wait_for_images();
     boards::ALL.iter().try_for_each(image_of)
 }
 

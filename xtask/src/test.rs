@@ -4,7 +4,7 @@
 use crate::real_recordings;
 use crate::setup;
 use crate::shell::{self, Error};
-use crate::steps::{NIGHTLY, QUICK, STEPS, TestStep};
+use crate::steps::{NIGHTLY, QUICK, STEPS, TestStep, build_images_ahead};
 use crate::workspace_build::compile_by_clippy;
 use std::time::Instant;
 
@@ -40,6 +40,9 @@ pub(crate) fn run(arguments: &[String]) -> Result<(), Error> {
         }
     }
     let mut summary = Summary::default();
+    if names.is_empty() && !quick {
+        build_images_ahead()?;
+    }
     summary.run(&chosen);
     for step in &NIGHTLY {
         summary.not_run(step.name, &format!("{}: `cargo xtask nightly {}`", step.shows, step.name));
