@@ -25,6 +25,12 @@ impl Page {
         Ok(page)
     }
 
+    /// Runs a script before every load of the page from now on.
+    pub fn before_load(&mut self, script: &str) -> Result<(), Error> {
+        let script = json!({ "source": script });
+        self.devtools.call("Page.addScriptToEvaluateOnNewDocument", script).map(drop)
+    }
+
     /// Shows the page in a view of another size, in CSS pixels.
     pub fn resize(&mut self, width: u32, height: u32, phone: bool) -> Result<(), Error> {
         let view = json!({ "width": width, "height": height, "deviceScaleFactor": 1, "mobile": phone });

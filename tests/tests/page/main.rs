@@ -15,5 +15,6 @@ mod needle;
 mod patient;
 mod practice;
 mod report;
+mod tablet;
 mod update;
 mod views;
