@@ -75,7 +75,7 @@ fn class(round: &[Hypothesis]) -> Vec<&'static str> {
 }
 
 fn answer(proposals: &Proposals) -> serde_json::Value {
-    let named = proposals.rounds.iter().take_while(|round| is_named(&round[0]));
+    let named = proposals.rounds.iter().filter(|round| is_named(&round[0])).take(3);
     let effect = |round: &Vec<Hypothesis>| {
         let share = both(round[0].evidence.share, |o| o.share, &round[0]);
         let confidence = if share > SURE { 0.9 } else { 0.7 };
@@ -93,7 +93,7 @@ fn answer(proposals: &Proposals) -> serde_json::Value {
                "rows": e.rows, "held_out": held})
     };
     let rows = proposals.rounds.iter().enumerate().flat_map(|(k, round)| round.iter().map(move |h| (k, h)));
-    let [refit, patched] = [0, effects.len()].map(|n| proposals.errors[n]);
+    let [refit, patched] = [0, proposals.rounds.len()].map(|n| proposals.errors[n]);
     let error = |e: regression::ForceError| json!({"fit": e.fit, "holdout": e.holdout});
     json!({
         "format": 1,

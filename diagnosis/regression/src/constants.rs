@@ -38,15 +38,15 @@ pub(crate) const STRETCHES: usize = 20;
 /// Spread of a nominal value, and of the gain, that the rig declares none for: the contract's example.
 pub(crate) const SPREAD: f64 = 0.5;
 pub(crate) const GAIN_SPREAD: f64 = 0.1;
-/// Power of the drive's force over the inertial force's below which nothing drives the axis: a command
-/// of zero has none, a drive that works a multiple.
-pub(crate) const UNDRIVEN: f64 = 0.01;
+/// Power of the drive's force over the inertial force's below which something else moves the axis: a
+/// drive that does it alone supplies at least all of it.
+pub(crate) const UNDRIVEN: f64 = 0.25;
 /// Least agreement of a law's sizes in two halves: 1 over 2.5, as the prototype on development cases.
 pub(crate) const SIZES_AGREE: f64 = 0.4;
 /// Least share that keeps the search going: a tenth of what any decision so far has named.
 pub(crate) const LEAST_SHARE: f64 = 0.01;
-/// Rounds of the search: the contract has three effects at most.
-pub(crate) const ROUNDS: usize = 3;
+/// Rounds of the search: the contract has three effects at most, and one may be refused.
+pub(crate) const ROUNDS: usize = 4;
 /// Rivals of each round that are read on the hold-out beside the chosen law: a class has three.
 pub(crate) const RIVALS: usize = 3;
 /// Waves of one law together, and what another must take: three orders carry a real motor's ripple.

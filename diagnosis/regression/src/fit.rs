@@ -178,29 +178,43 @@ impl<'a> Model<'a> {
         last
     }
 
+    /// The agreement of the mean offset of the hold-out with that of the fit, over the larger.
+    pub(crate) fn offsets_agree(&self) -> f64 {
+        let p = self.problem;
+        let mean = |x: Vec<f64>| x.iter().sum::<f64>() / x.len().max(1) as f64;
+        let at = p.nominal.len();
+        let fit = mean(self.fitted.values[at..at + p.fit_recordings].to_vec());
+        let held = p.fit_recordings..p.recordings;
+        let columns: Vec<Vec<f64>> = held.map(|i| only(p, &p.one, i)).collect();
+        let there = mean(self.alone(&self.laws, &columns)[at..at + columns.len()].to_vec());
+        fit * there / (fit * fit).max(there * there).max(1e-300)
+    }
+
+    /// Values of a fit to the hold-out alone: nominal terms, `offsets`, laws.
+    fn alone(&self, laws: &[&Candidate], offsets: &[Vec<f64>]) -> Vec<f64> {
+        let p = self.problem;
+        let (first, end) = (p.tiling.fit_rows, p.tiling.rows.len());
+        let weigh = |c: &[f64]| -> Vec<f64> { (first..end).map(|k| c[k] * self.root[k]).collect() };
+        let mut columns: Vec<Vec<f64>> = p.nominal.iter().map(|n| weigh(&n.column)).collect();
+        columns.extend(offsets.iter().map(|c| weigh(c)));
+        for law in laws {
+            columns.extend(expanded(p, law, p.fit_recordings..p.recordings).iter().map(|c| weigh(c)));
+        }
+        let mut sums = sums(&columns, &columns, &weigh(&p.y));
+        let frames = (p.tiling.frames - p.tiling.fit_frames).max(1);
+        add_prior(p, &mut sums, (end - first) as f64 / frames as f64);
+        Factor::new(&sums.left).solve(&sums.right)
+    }
+
     /// The agreement of the last law's force with that of a fit to the hold-out alone.
     fn held_out_size(&self, laws: &[&Candidate], law: &Candidate, values: &[f64]) -> f64 {
         let p = self.problem;
-        let (first, end) = (p.tiling.fit_rows, p.tiling.rows.len());
-        let held = p.fit_recordings..p.recordings;
-        let weigh = |c: &[f64]| -> Vec<f64> { (first..end).map(|k| c[k] * self.root[k]).collect() };
-        let mut columns: Vec<Vec<f64>> = p.nominal.iter().map(|n| weigh(&n.column)).collect();
-        if self.with_offsets {
-            columns.extend(held.clone().map(|i| weigh(&only(p, &p.one, i))));
-        }
-        for law in laws {
-            columns.extend(expanded(p, law, held.clone()).iter().map(|c| weigh(c)));
-        }
-        let y = weigh(&p.y);
-        let mut sums = sums(&columns, &columns, &y);
-        let rows_a_frame = (end - first) as f64 / (p.tiling.frames - p.tiling.fit_frames).max(1) as f64;
-        add_prior(p, &mut sums, rows_a_frame);
-        let there = Factor::new(&sums.left).solve(&sums.right);
-        agreement(
-            &columns[columns.len() - law.columns.len()..],
-            values,
-            &there[columns.len() - law.columns.len()..],
-        )
+        let held = if self.with_offsets { p.fit_recordings..p.recordings } else { 0..0 };
+        let offsets: Vec<Vec<f64>> = held.map(|i| only(p, &p.one, i)).collect();
+        let there = self.alone(laws, &offsets);
+        let weigh = |c: &Vec<f64>| (p.tiling.fit_rows..c.len()).map(|k| c[k] * self.root[k]).collect();
+        let columns: Vec<Vec<f64>> = law.columns.iter().map(weigh).collect();
+        agreement(&columns, values, &there[there.len() - columns.len()..])
     }
 }
 

@@ -55,7 +55,7 @@ pub struct ForceError {
 /// The rounds of the search, each with the best of every law, the chosen one first.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Proposals {
-    /// At most three; each is beside the first laws of those before.
+    /// At most four; each is beside the first laws of those before.
     pub rounds: Vec<Vec<Hypothesis>>,
     /// Force error of the nominal structure, and after the first law of each round.
     pub errors: Vec<ForceError>,

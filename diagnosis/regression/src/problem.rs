@@ -133,6 +133,7 @@ impl Problem {
         let inertia = &mut self.nominal[0];
         if power(&self.y) < UNDRIVEN * power(&inertia.column) * inertia.mean.powi(2) {
             inertia.variance = (1e-3 * inertia.mean).powi(2);
+            self.machine.scales.driven = false;
         }
     }
 

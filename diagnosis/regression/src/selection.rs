@@ -278,8 +278,9 @@ impl Search {
     fn held_out(&self, model: &Model, candidate: &Candidate, fitted: &Fitted) -> HeldOut {
         let p = &self.problem;
         let laws: Vec<&Candidate> = model.laws.iter().copied().chain([candidate]).collect();
-        let (after, size_agreement) = model.hold_out(&laws, fitted);
+        let (after, mut size_agreement) = model.hold_out(&laws, fitted);
         let before = if takes_offsets(candidate) {
+            size_agreement = model.offsets_agree();
             let bare = model.without_offsets();
             bare.hold_out(&model.laws, &bare.fitted).0
         } else {

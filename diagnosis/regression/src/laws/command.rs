@@ -114,7 +114,7 @@ fn if_driven(m: &Machine, shapes: Vec<Shape>) -> Vec<Shape> {
 }
 
 fn deadband_shapes(m: &Machine) -> Vec<Shape> {
-    if_driven(m, Shape::grid("", &[0.01, 0.03, 0.08, 0.2]))
+    if_driven(m, Shape::grid("", &[0.01, 0.03, 0.08, 0.2, 0.4]))
 }
 fn deadband(m: &Machine, i: usize, shape: &Shape) -> Vec<Vec<f64>> {
     let width = shape.value * large(m);

@@ -35,9 +35,12 @@ pub(super) static LAWS: [Law; 13] = [
         refines: DRY,
         ..law("asymmetric_friction", "F·|sgn q̇| + b·|q̇|, or one of them", "", asymmetric_shapes, asymmetric)
     },
-    Law { refines: VISCOUS, ..law("quadratic_drag", "c·q̇·|q̇|", "", always, quadratic) },
+    Law {
+        refines: VISCOUS, size: Size::Positive, ..law("quadratic_drag", "c·q̇·|q̇|", "", always, quadratic)
+    },
     Law {
         refines: DRY,
+        size: Size::Positive,
         ..law(
             "stribeck_friction",
             "P·sgn q̇·exp(−(|q̇|/v)^δ)",
@@ -48,6 +51,7 @@ pub(super) static LAWS: [Law; 13] = [
     },
     Law {
         refines: DRY,
+        size: Size::Positive,
         ..law(
             "presliding_friction",
             "F·(z − sgn q̇), z bristles that yield over x",
@@ -66,7 +70,10 @@ pub(super) static LAWS: [Law; 13] = [
             drift,
         )
     },
-    law("load_dependent_friction", "µ·|load|·sgn q̇", "", load_shapes, load_friction),
+    Law {
+        size: Size::Positive,
+        ..law("load_dependent_friction", "µ·|load|·sgn q̇", "", load_shapes, load_friction)
+    },
     law("position_spring", "c·x + d·x³, or on one side of a place", "the side", spring_shapes, spring),
     Law {
         refines: DRY,

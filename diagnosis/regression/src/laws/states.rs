@@ -63,6 +63,8 @@ pub struct Scales {
     pub seconds: f64,
     /// Standard deviation of a reading.
     pub noise: f64,
+    /// True if the drive supplies a part of the force worth mentioning.
+    pub driven: bool,
     /// Force asked for that 98 % of the time is not reached; zero before it is known.
     pub large_asked: f64,
 }
@@ -156,6 +158,7 @@ impl Scales {
             least_travel: least_travel.fold(f64::INFINITY, f64::min),
             seconds: most(&|i| signals[i].h * signals[i].len() as f64),
             noise: most(&|i| signals[i].noise),
+            driven: true,
             large_asked: 0.0,
         }
     }

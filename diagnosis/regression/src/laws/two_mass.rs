@@ -62,9 +62,14 @@ fn follow(s: &States, fastest: f64, brake: f64, push: impl Fn(f64, f64, f64) -> 
         .collect()
 }
 
+/// A load that could let go of an axis that nothing drives would explain all of its force.
+fn if_driven(m: &Machine, shapes: Vec<Shape>) -> Vec<Shape> {
+    if m.scales.driven { shapes } else { Vec::new() }
+}
+
 fn spring_shapes(m: &Machine) -> Vec<Shape> {
     let (low, high) = (m.scales.lowest_hz.max(2.0), (2.5 * m.scales.band_hz).min(0.2 * m.scales.rate_hz));
-    if high > low { Shape::grid("", &logarithmic(low, high, 5)) } else { Vec::new() }
+    if_driven(m, Shape::grid("", &logarithmic(low, high, 5)))
 }
 fn spring(m: &Machine, i: usize, shape: &Shape) -> Vec<Vec<f64>> {
     const DAMPING: f64 = 0.06;
@@ -74,7 +79,7 @@ fn spring(m: &Machine, i: usize, shape: &Shape) -> Vec<Vec<f64>> {
 
 fn gap_shapes(m: &Machine) -> Vec<Shape> {
     let (low, high) = ((7.0 * m.scales.noise).max(2e-4 * m.scales.short_stroke), 0.1 * m.scales.short_stroke);
-    if high > low { Shape::grid("", &logarithmic(low, high, 4)) } else { Vec::new() }
+    if_driven(m, Shape::grid("", &logarithmic(low, high, 4)))
 }
 fn gap(m: &Machine, i: usize, shape: &Shape) -> Vec<Vec<f64>> {
     const DAMPING: f64 = 0.3;
@@ -91,8 +96,8 @@ fn gap(m: &Machine, i: usize, shape: &Shape) -> Vec<Vec<f64>> {
     vec![follow(&m.states[i], w, 0.06 * m.scales.hard, push)]
 }
 
-fn slip_shapes(_: &Machine) -> Vec<Shape> {
-    Shape::grid("", &[0.12, 0.25, 0.5])
+fn slip_shapes(m: &Machine) -> Vec<Shape> {
+    if_driven(m, Shape::grid("", &[0.12, 0.25, 0.5]))
 }
 fn slip(m: &Machine, i: usize, shape: &Shape) -> Vec<Vec<f64>> {
     let most = shape.value * m.scales.hard;

@@ -51,14 +51,9 @@ fn orders(m: &Machine) -> Vec<Shape> {
     };
     (1..=ORDERS).filter(seen).map(|n| Shape::fixed("order", turn / n as f64)).collect()
 }
-/// True if the period is one turn of the coordinate itself, where gravity acts.
-fn is_a_turn(m: &Machine, period: f64) -> bool {
-    m.rig.rotary && (period / TAU - 1.0).abs() < 1e-6
-}
-
 fn cogging_shapes(m: &Machine) -> Vec<Shape> {
     if m.rig.turn.is_some() {
-        return orders(m).into_iter().filter(|s| !is_a_turn(m, s.value)).collect();
+        return orders(m);
     }
     let travel = m.scales.least_travel;
     let most = (4.0 * m.scales.band_hz * travel / m.scales.fast).min(60.0);
@@ -68,8 +63,8 @@ fn cogging_shapes(m: &Machine) -> Vec<Shape> {
     Shape::grid("period", &periods)
 }
 fn imbalance_shapes(m: &Machine) -> Vec<Shape> {
-    // A good half of a turn bends enough to differ from a spring.
-    let seen = m.rig.rotary && m.scales.least_travel > 0.6 * TAU;
+    // Over a fifth of a turn, a sine bends by a tenth and differs from a spring.
+    let seen = m.rig.rotary && m.scales.least_travel > 0.2 * TAU;
     if seen { vec![Shape::fixed("order", TAU)] } else { Vec::new() }
 }
 fn wave(m: &Machine, i: usize, shape: &Shape) -> Vec<Vec<f64>> {
