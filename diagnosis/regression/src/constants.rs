@@ -41,8 +41,8 @@ pub(crate) const GAIN_SPREAD: f64 = 0.1;
 /// Power of the drive's force over the inertial force's below which something else moves the axis: a
 /// drive that does it alone supplies at least all of it.
 pub(crate) const UNDRIVEN: f64 = 0.25;
-/// Least agreement of a law's sizes in two halves: 1 over 2.5, as the prototype on development cases.
-pub(crate) const SIZES_AGREE: f64 = 0.4;
+/// Least agreement of a law's sizes in two halves of the fit: a factor of two, as the plain rival.
+pub(crate) const SIZES_AGREE: f64 = 0.5;
 /// Least share that keeps the search going: a tenth of what any decision so far has named.
 pub(crate) const LEAST_SHARE: f64 = 0.01;
 /// Rounds of the search: the contract has three effects at most, and one may be refused.

@@ -39,16 +39,20 @@ pub struct HeldOut {
     pub size_agreement: f64,
 }
 
-/// Share and gain by frame of residuals `after` against `before`; `first` is the first row's number.
+/// Share, and gain by frame as half a logarithm, of residuals `after` against `before`; `first` is the first row's number.
 pub(crate) fn compare(p: &Problem, before: &[f64], after: &[f64], first: usize) -> (f64, Vec<f64>) {
     let share = 1.0 - (dot(after, after) / (dot(before, before) + 1e-300)).sqrt();
     let rows = &p.tiling.rows[first..first + before.len()];
     let start = rows.first().map_or(0, |r| r.frame);
-    let mut gains = vec![0.0; rows.last().map_or(0, |r| r.frame + 1 - start)];
+    let count = rows.last().map_or(0, |r| r.frame + 1 - start);
+    let mut sums = vec![(0.0, 0.0); count];
     for ((row, b), a) in rows.iter().zip(before).zip(after) {
-        gains[row.frame - start] += 0.5 * (b * b - a * a);
+        sums[row.frame - start].0 += b * b;
+        sums[row.frame - start].1 += a * a;
     }
-    (share, gains)
+    // In logarithms beside the mean frame: a few loud frames do not decide.
+    let mean = sums.iter().map(|s| s.1).sum::<f64>() / count.max(1) as f64 + 1e-300;
+    (share, sums.iter().map(|(b, a)| 0.5 * ((b + mean) / (a + mean)).ln()).collect())
 }
 
 /// Mean over standard error; zero of fewer than three.

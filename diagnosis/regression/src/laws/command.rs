@@ -102,12 +102,12 @@ fn large(m: &Machine) -> f64 {
     m.scales.large_asked.max(1e-30)
 }
 /// True if every drive was on most of the time and was moved.
-fn driven(m: &Machine) -> bool {
+pub(super) fn driven(m: &Machine) -> bool {
     let on = |s: &States| {
         let used = s.force.iter().filter(|f| **f != 0.0).count();
         2 * used > s.force.len() && spread(&s.force) > 0.0
     };
-    !m.asked.is_empty() && m.states.iter().all(on)
+    !m.asked.is_empty() && m.scales.driven && m.states.iter().all(on)
 }
 fn if_driven(m: &Machine, shapes: Vec<Shape>) -> Vec<Shape> {
     if driven(m) { shapes } else { Vec::new() }
@@ -144,9 +144,9 @@ fn clip(m: &Machine, i: usize, shape: &Shape) -> Vec<Vec<f64>> {
 }
 
 fn delay_shapes(m: &Machine) -> Vec<Shape> {
-    // From the laws' step to half a period of the band, beyond which a delay has no sign.
-    let (least, most) = (1.0 / m.scales.rate_hz / 8.0, 0.4 / m.scales.band_hz);
-    if_driven(m, Shape::grid("", &numerics::golden_section::logarithmic(least, most, 6)))
+    // From a five-hundredth to nearly half a period of the band, beyond which a delay has no sign.
+    let (least, most) = (2e-3 / m.scales.band_hz, 0.4 / m.scales.band_hz);
+    if_driven(m, Shape::grid("", &numerics::golden_section::logarithmic(least, most, 8)))
 }
 fn delay(m: &Machine, i: usize, shape: &Shape) -> Vec<Vec<f64>> {
     let (s, u) = (&m.states[i], &m.asked[i]);

@@ -82,7 +82,7 @@ impl States {
         let error = 0.05 * (rms / rig.inertia.nominal) / (s.noise * TAU * TAU);
         let seen_hz = (error * error * 2.5 * s.rate_hz).powf(0.2);
         let seen_hz = seen_hz.min(2.0 * tiling.band_hz).max(s.narrowest_hz);
-        let seen = second_difference(&low_pass(&s.q_raw, s.rate_hz, seen_hz, 2), s.h);
+        let seen = second_difference(&low_pass(&s.q_raw, s.rate_hz, seen_hz, 4), s.h);
         let v = pick(&s.v);
         Self {
             h,
@@ -107,28 +107,37 @@ impl States {
     }
 }
 
-/// Counts lost so far, in rad or m: steps of a reading against the motion that are several times
-/// its noise and at least three counts, and that its neighbours do not share.
+/// Counts lost so far, in rad or m: steps of a reading against the motion, as the difference of its
+/// means just after and just before beyond what its speed on both sides makes. They have to be three
+/// counts and six times what that difference usually is.
 fn jumps(s: &Signals, rig: &Rig) -> Vec<f64> {
-    const NEAR: usize = 6;
+    const NEAR: usize = 8;
     let n = s.len();
-    let least = (3.0 / rig.counts_per_unit).max(8.0 * s.noise);
-    let mut lost = 0.0;
     let mut out = vec![0.0; n];
-    for i in 1..n {
+    if n < 5 * NEAR {
+        return out;
+    }
+    let mut sums = vec![0.0; n + 1];
+    (0..n).for_each(|i| sums[i + 1] = sums[i] + s.q_raw[i]);
+    let mean = |from: usize| (sums[from + NEAR] - sums[from]) / NEAR as f64;
+    let step = |i: usize| {
+        let outside = mean(i + NEAR) - mean(i) + mean(i - NEAR) - mean(i - 2 * NEAR);
+        mean(i) - mean(i - NEAR) - 0.5 * outside
+    };
+    let inside = 2 * NEAR..n - 2 * NEAR;
+    let steps: Vec<f64> =
+        (0..n).map(|i| if inside.contains(&i) && !s.masked[i] { step(i) } else { 0.0 }).collect();
+    let usual = quantile(steps.iter().filter(|x| **x != 0.0).map(|x| x.abs()), 0.5) / 0.674;
+    let least = (3.0 / rig.counts_per_unit).max(6.0 * usual);
+    let mut lost = 0.0;
+    for i in 0..n {
+        let near = i.saturating_sub(NEAR)..(i + NEAR + 1).min(n);
+        let largest =
+            steps[i].abs() > least && near.clone().all(|k| k == i || steps[k].abs() < steps[i].abs());
+        if largest && steps[i] * s.v[i] < 0.0 {
+            lost -= steps[i];
+        }
         out[i] = lost;
-        if i < NEAR || i + NEAR >= n || s.masked[i] {
-            continue;
-        }
-        let step = |k: usize| s.q_raw[k] - s.q_raw[k - 1];
-        let around = (i - NEAR + 1..i + NEAR).filter(|k| k.abs_diff(i) > 1).map(step);
-        let usual = quantile(around, 0.5);
-        let jump = step(i) - usual;
-        let stays = s.q_raw[i + 3] - s.q_raw[i - 1] - 4.0 * usual;
-        if jump * usual < 0.0 && jump.abs() > least && (stays / jump - 1.0).abs() < 0.5 {
-            lost -= jump;
-            out[i] = lost;
-        }
     }
     out
 }

@@ -88,7 +88,7 @@ fn eccentricity(m: &Machine, i: usize, shape: &Shape) -> Vec<Vec<f64>> {
 }
 
 fn ripple_shapes(m: &Machine) -> Vec<Shape> {
-    if m.asked.is_empty() { Vec::new() } else { orders(m) }
+    if super::command::driven(m) { orders(m) } else { Vec::new() }
 }
 fn ripple(m: &Machine, i: usize, shape: &Shape) -> Vec<Vec<f64>> {
     let times = |x: Vec<f64>| x.iter().zip(&m.asked[i]).map(|(x, u)| x * u).collect();
