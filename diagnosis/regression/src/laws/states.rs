@@ -108,33 +108,34 @@ impl States {
 }
 
 /// Counts lost so far, in rad or m: steps of a reading against the motion, as the difference of its
-/// means just after and just before beyond what its speed on both sides makes. They have to be three
-/// counts and six times what that difference usually is.
+/// means after and before beyond what its speed on both sides makes. They have to be three counts
+/// and six times what that difference usually is.
 fn jumps(s: &Signals, rig: &Rig) -> Vec<f64> {
-    const NEAR: usize = 8;
     let n = s.len();
+    // Windows of 0.8 ms; counts that are lost in a row take about as long.
+    let w = ((8e-4 * s.rate_hz) as usize).clamp(2, 8);
     let mut out = vec![0.0; n];
-    if n < 5 * NEAR {
+    if n < 8 * w {
         return out;
     }
     let mut sums = vec![0.0; n + 1];
     (0..n).for_each(|i| sums[i + 1] = sums[i] + s.q_raw[i]);
-    let mean = |from: usize| (sums[from + NEAR] - sums[from]) / NEAR as f64;
+    let mean = |from: usize| (sums[from + w] - sums[from]) / w as f64;
     let step = |i: usize| {
-        let outside = mean(i + NEAR) - mean(i) + mean(i - NEAR) - mean(i - 2 * NEAR);
-        mean(i) - mean(i - NEAR) - 0.5 * outside
+        let [before, after] = [mean(i - 2 * w), mean(i + w)];
+        let speeds = mean(i + 2 * w) - after + before - mean(i - 3 * w);
+        after - before - 1.5 * speeds
     };
-    let inside = 2 * NEAR..n - 2 * NEAR;
-    let steps: Vec<f64> =
-        (0..n).map(|i| if inside.contains(&i) && !s.masked[i] { step(i) } else { 0.0 }).collect();
+    let inside = 3 * w..n - 3 * w;
+    let seen = |i: usize| inside.contains(&i) && !s.masked[i];
+    let steps: Vec<f64> = (0..n).map(|i| if seen(i) { step(i) } else { 0.0 }).collect();
     let usual = quantile(steps.iter().filter(|x| **x != 0.0).map(|x| x.abs()), 0.5) / 0.674;
     let least = (3.0 / rig.counts_per_unit).max(6.0 * usual);
     let mut lost = 0.0;
     for i in 0..n {
-        let near = i.saturating_sub(NEAR)..(i + NEAR + 1).min(n);
-        let largest =
-            steps[i].abs() > least && near.clone().all(|k| k == i || steps[k].abs() < steps[i].abs());
-        if largest && steps[i] * s.v[i] < 0.0 {
+        let near = i.saturating_sub(3 * w)..(i + 3 * w + 1).min(n);
+        let against = steps[i].abs() > least && steps[i] * s.v[i] < 0.0;
+        if against && near.clone().all(|k| steps[k].abs() <= steps[i].abs()) {
             lost -= steps[i];
         }
         out[i] = lost;

@@ -42,24 +42,28 @@ fn follow(s: &States, fastest: f64, brake: f64, push: impl Fn(f64, f64, f64) -> 
     let steps = (fastest * s.h / 0.2).ceil().max(1.0) as usize;
     let h = s.h / steps as f64;
     let (mut x, mut u) = (s.q[0], s.v[0]);
-    s.each(|k| k as f64)
-        .iter()
-        .map(|k| {
-            let k = *k as usize;
-            let next = (k + 1).min(s.q.len() - 1);
-            let mut sum = 0.0;
-            for part in 0..steps {
-                let f = (part as f64 + 0.5) / steps as f64;
-                let between = |y: &[f64]| y[k] + (y[next] - y[k]) * f;
-                let a = push(between(&s.q) - x, between(&s.v) - u, h);
-                u += a * h;
-                u -= u.clamp(-brake * h, brake * h);
-                x += u * h;
-                sum += a;
-            }
-            sum / steps as f64 - s.a[k]
-        })
-        .collect()
+    let mut between_points = |k: usize| {
+        let next = (k + 1).min(s.q.len() - 1);
+        let mut sum = 0.0;
+        for part in 0..steps {
+            let f = (part as f64 + 0.5) / steps as f64;
+            let at = |y: &[f64]| y[k] + (y[next] - y[k]) * f;
+            let a = push(at(&s.q) - x, at(&s.v) - u, h);
+            u += a * h;
+            u -= u.clamp(-brake * h, brake * h);
+            x += u * h;
+            sum += a;
+        }
+        sum / steps as f64
+    };
+    // The mean about a point; that of the interval after it would come half a step early.
+    let mut last = 0.0;
+    let mut about = |k: usize| {
+        let next = between_points(k);
+        let mean = 0.5 * (std::mem::replace(&mut last, next) + next);
+        mean - s.a[k]
+    };
+    (0..s.q.len()).map(&mut about).collect()
 }
 
 /// A load that could let go of an axis that nothing drives would explain all of its force.
