@@ -93,3 +93,57 @@ pub(crate) fn reading_noise(counts: &[f64]) -> f64 {
     let blocks = moving.map(|c| c.windows(9).map(power).sum::<f64>() / (c.len() - 8) as f64);
     crate::filters::quantile(blocks, 0.5).sqrt()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A held command on a double integrator, integrated piece by piece without a grid.
+    #[test]
+    fn the_second_difference_is_the_mean_force_under_the_hat() {
+        let stamps = [0.0_f64, 0.013, 0.021, 0.04, 0.058, 0.071, 0.1];
+        let force = [2.0_f64, -3.0, 0.5, 4.0, -1.0, 1.5, 0.0];
+        let h = 0.01;
+        let place = |t: f64| {
+            let (mut q, mut v) = (0.3, -0.2);
+            for i in 0..stamps.len() {
+                let end = if i + 1 < stamps.len() { stamps[i + 1].min(t) } else { t };
+                let d = (end - stamps[i]).max(0.0);
+                q += v * d + 0.5 * force[i] * d * d;
+                v += force[i] * d;
+            }
+            q
+        };
+        let at: Vec<f64> = (1..9).map(|i| f64::from(i) * h).collect();
+        let mean = mean_under_hat(&stamps, &force, &at, h);
+        for (t, mean) in at.iter().zip(mean) {
+            let second = (place(t + h) - 2.0 * place(*t) + place(t - h)) / (h * h);
+            assert!((second - mean).abs() < 1e-9, "{t}: {second} {mean}");
+        }
+    }
+
+    #[test]
+    fn cubics_are_exact_on_parabolas_between_jittered_stamps() {
+        let stamps: Vec<f64> = (0..20).map(|i| f64::from(i) + 0.2 * f64::from(i * i % 3)).collect();
+        let f = |t: f64| 1.0 - 2.0 * t + 0.3 * t * t;
+        let x: Vec<f64> = stamps.iter().map(|t| f(*t)).collect();
+        let at: Vec<f64> = (35..170).map(|i| 0.1 * f64::from(i)).collect();
+        cubic(&stamps, &x, &at).iter().zip(&at).for_each(|(y, t)| assert!((y - f(*t)).abs() < 1e-9));
+    }
+
+    #[test]
+    fn reading_noise_is_found_under_a_motion() {
+        let mut seed = 1_u64;
+        let mut uniform = || {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            (seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+        };
+        let motion = |i: usize| 4000.0 * (i as f64 * 0.01).sin();
+        let noisy: Vec<f64> = (0..6400).map(|i| motion(i) + 7.0 * uniform()).collect();
+        let expected = 7.0 / 12_f64.sqrt();
+        assert!((reading_noise(&noisy) / expected - 1.0).abs() < 0.1, "{}", reading_noise(&noisy));
+        let clean: Vec<f64> = (0..6400).map(motion).collect();
+        assert!(reading_noise(&clean) < 0.01 * expected);
+        assert_eq!((quantisation(&noisy), quantisation(&[1.0, 5.0])), (0.0, 12_f64.sqrt().recip()));
+    }
+}

@@ -75,7 +75,8 @@ impl Problem {
         problem.fix_inertia_if_not_driven();
         problem.reading = problem.reading_variance(rig.inertia.nominal);
         let part = |s: &Signals| (s.least_noise / s.noise).powi(2);
-        problem.least_reading_part = problem.signals.iter().map(part).fold(1.0, f64::min);
+        problem.least_reading_part =
+            problem.signals.iter().take(fit_recordings).map(part).fold(1.0, f64::min);
         problem
     }
 

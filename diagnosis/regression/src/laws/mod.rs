@@ -6,6 +6,8 @@
 mod command;
 mod motion;
 mod states;
+#[cfg(test)]
+mod tests;
 mod two_mass;
 mod waves;
 
