@@ -7,7 +7,7 @@ use super::definition::{
 use super::load::{Load, MOST_OF_DRY, Machine, RATIOS, own_friction};
 use super::shape::{ShapeKey, shape};
 use super::{Effect, EffectName, State, Subsystem};
-use crate::numerics::golden_section::logarithmic;
+use numerics::golden_section::logarithmic;
 
 #[derive(Debug, Clone)]
 struct BacklashLaw(Load);

@@ -3,7 +3,7 @@
 use super::definition::{EffectLaw, EffectReport, EffectSearch, Fitted, Movable, Reported, Span};
 use super::shape::{ShapeKey, shape};
 use super::{CommandLaw, Effect, EffectName, Subsystem, Variable};
-use crate::numerics::golden_section::logarithmic;
+use numerics::golden_section::logarithmic;
 
 shape! {
     /// The band.

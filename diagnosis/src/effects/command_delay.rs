@@ -4,7 +4,7 @@ use super::definition::{EffectLaw, EffectReport, EffectSearch, Fitted, Movable, 
 use super::joint_terms::JointTerms;
 use super::shape::{ShapeKey, shape};
 use super::{CommandLaw, Effect, EffectName, Subsystem, experiments};
-use crate::numerics::golden_section::logarithmic;
+use numerics::golden_section::logarithmic;
 
 /// Longest delay worth looking for, s: a few rows of a slow controller.
 fn longest(span: &Span) -> f64 {

@@ -5,7 +5,7 @@ use super::definition::{EffectLaw, EffectReport, EffectSearch, Fitted, Movable, 
 use super::joint_terms::JointTerms;
 use super::shape::{ShapeKey, shape};
 use super::{CommandLaw, Effect, EffectName, Subsystem, Variable, experiments};
-use crate::numerics::golden_section::logarithmic;
+use numerics::golden_section::logarithmic;
 
 shape! {
     /// The clip.

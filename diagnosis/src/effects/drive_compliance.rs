@@ -6,7 +6,7 @@ use super::definition::{
 };
 use super::shape::{ShapeKey, shape};
 use super::{Effect, EffectName, State, Subsystem};
-use crate::numerics::golden_section::logarithmic;
+use numerics::golden_section::logarithmic;
 use std::f64::consts::TAU;
 
 /// Resonance above which a spring holds like a solid shaft, Hz.

@@ -7,7 +7,7 @@ use super::definition::{
 use super::law::{first_or_both, sign};
 use super::shape::{ShapeKey, shape};
 use super::{Effect, EffectName, State, Subsystem, experiments};
-use crate::numerics::golden_section::logarithmic;
+use numerics::golden_section::logarithmic;
 
 shape! {
     /// The course of the drift.

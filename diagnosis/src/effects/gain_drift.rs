@@ -10,7 +10,7 @@ use super::definition::{
 };
 use super::shape::{ShapeKey, shape};
 use super::{Effect, EffectName, State, Subsystem, experiments};
-use crate::numerics::golden_section::logarithmic;
+use numerics::golden_section::logarithmic;
 
 shape! {
     /// The course of the drift.

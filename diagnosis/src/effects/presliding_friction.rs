@@ -9,7 +9,7 @@ use super::definition::{
 use super::law::{first_or_both, sign};
 use super::shape::ShapeKey;
 use super::{Effect, EffectName, State, Subsystem};
-use crate::numerics::golden_section::logarithmic;
+use numerics::golden_section::logarithmic;
 
 /// Longest over shortest of the lengths over which bristles bend, where they are not all alike:
 /// asperities of many sizes.

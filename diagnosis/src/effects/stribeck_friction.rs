@@ -8,7 +8,7 @@ use super::definition::{
 use super::law::sign;
 use super::shape::{ShapeKey, shape};
 use super::{Effect, EffectName, State, Subsystem, Variable};
-use crate::numerics::golden_section::logarithmic;
+use numerics::golden_section::logarithmic;
 
 #[derive(Debug, Clone)]
 struct StribeckFrictionLaw {

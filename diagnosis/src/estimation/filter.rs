@@ -11,7 +11,7 @@ use crate::estimation::covariance::{Gain, covariances, settling};
 pub(crate) use crate::estimation::covariance::{Noise, Observed};
 use crate::estimation::input::{Input, Total};
 use crate::estimation::reading_lag::LagStep;
-use crate::numerics::parallel;
+use numerics::parallel;
 use std::ops::Range;
 use std::sync::Arc;
 

@@ -7,8 +7,8 @@ use crate::estimation::input::{Input, Total};
 use crate::estimation::model::{Column, Model, total};
 use crate::estimation::nominal::{Key, Nominal};
 use crate::estimation::whitened::{grams, nominal_columns};
-use crate::numerics::linear::{Prior, Solution, Square, bounded};
-use crate::numerics::parallel;
+use numerics::linear::{Prior, Solution, Square, bounded};
+use numerics::parallel;
 use std::ops::Range;
 
 /// A model over one recording under one noise: residuals at the reference and whitened columns.

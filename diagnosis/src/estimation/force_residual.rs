@@ -177,7 +177,7 @@ mod tests {
     use crate::estimation::nominal::{Key, Nominal};
     use crate::io::recording::Recording;
     use crate::io::rig::Rig;
-    use crate::numerics::bootstrap::Random;
+    use numerics::bootstrap::Random;
 
     #[test]
     fn a_white_disturbance_leaves_what_is_said() {

@@ -5,7 +5,7 @@ use crate::effects::Effect;
 use crate::estimation::blocks::Rows;
 use crate::estimation::filter::{Gains, Noise};
 use crate::estimation::input::Input;
-use crate::numerics::linear::Square;
+use numerics::linear::Square;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Sets of nominal columns that are kept for a recording, and inputs of effects.

@@ -4,8 +4,8 @@
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::filter::Gains;
 use crate::estimation::fit::Fit;
-use crate::numerics::linear::dot;
-use crate::numerics::linear::{Factor, Square};
+use numerics::linear::dot;
+use numerics::linear::{Factor, Square};
 
 /// The requirements on a jump and on a recording.
 #[derive(Clone, Copy)]

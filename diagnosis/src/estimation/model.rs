@@ -9,7 +9,7 @@ use crate::estimation::filter::Noise;
 use crate::estimation::input::{Input, Total};
 use crate::estimation::nominal::{Key, Nominal};
 use crate::estimation::regressors::kept_inputs;
-use crate::numerics::linear::Prior;
+use numerics::linear::Prior;
 
 /// One column over one recording.
 pub(crate) struct Column {

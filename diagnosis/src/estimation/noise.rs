@@ -5,7 +5,7 @@ use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::covariance::rhos;
 use crate::estimation::filter::{Noise, Observed, innovations, robust_loss};
 use crate::estimation::input::Total;
-use crate::numerics::parallel;
+use numerics::parallel;
 use std::ops::Range;
 use std::sync::{Arc, Mutex, PoisonError};
 

@@ -7,7 +7,7 @@ use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::filter::Noise;
 use crate::estimation::skew_columns;
 use crate::io::rig::Rig;
-use crate::numerics::linear::Prior;
+use numerics::linear::Prior;
 
 /// A column's meaning. Coefficients are accelerations: force divided by inertia.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -3,9 +3,9 @@
 
 use crate::io::recording::Recording;
 use crate::io::rig::{Kind, Rig};
-use crate::numerics::linear::{Factor, Square};
-use crate::numerics::spread::spread;
 use crate::simulation::Motion;
+use numerics::linear::{Factor, Square};
+use numerics::spread::spread;
 use std::f64::consts::{PI, TAU};
 
 /// Readings of an encoder are whole counts: where more than this part is not, and fewer counts than

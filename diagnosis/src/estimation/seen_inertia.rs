@@ -11,8 +11,8 @@ use crate::estimation::fit::Fit;
 use crate::estimation::force_residual::Estimator;
 use crate::estimation::model::Model;
 use crate::estimation::nominal::{Kept, Nominal};
-use crate::numerics::linear::{Prior, Square, bounded};
 use crate::thresholds::MATERIAL;
+use numerics::linear::{Prior, Square, bounded};
 
 /// Factor by which a gain over inertia that is hardly known may differ from the rig's.
 const REACH: f64 = 40.0;

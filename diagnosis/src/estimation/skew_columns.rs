@@ -1,6 +1,6 @@
 //! The two columns that a skew between command and reading adds to a model, and their priors.
 
-use crate::numerics::linear::Prior;
+use numerics::linear::Prior;
 
 /// Largest skew, rows: a command that is farther off is late for another reason.
 pub(crate) const MOST_ROWS: f64 = 1.0;

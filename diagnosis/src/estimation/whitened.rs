@@ -6,8 +6,8 @@ use crate::estimation::input::Input;
 use crate::estimation::kept::Whitened;
 use crate::estimation::model::{Column, total};
 use crate::estimation::nominal::Key;
-use crate::numerics::linear::{Square, dot};
-use crate::numerics::parallel;
+use numerics::linear::{Square, dot};
+use numerics::parallel;
 use std::sync::Arc;
 
 /// The nominal columns, which are the first of `columns`, under a noise.

@@ -2,7 +2,7 @@
 
 use crate::io::recording::Recording;
 use crate::io::rig::Rig;
-use crate::numerics::spread::spread;
+use numerics::spread::spread;
 
 /// Least of all recordings of a kind together, s and rows: short ones are pooled.
 const SHORTEST_S: f64 = 1.9;

@@ -10,7 +10,6 @@ use crate::estimation::model::Model;
 use crate::estimation::noise::Colour;
 use crate::estimation::refit;
 use crate::estimation::smoother::Knows;
-use crate::numerics::parallel;
 use crate::selection::context::{FitContext, FittedModel, MOST};
 use crate::selection::{candidates, joint};
 use crate::thresholds::MIN_LOG_LIKELIHOOD_GAIN;
@@ -21,6 +20,7 @@ use crate::validation::holdout_set::HoldoutSet;
 use crate::validation::parameters;
 use crate::validation::rejection::Rejection;
 use crate::validation::residuals::forces;
+use numerics::parallel;
 use std::cell::Cell;
 
 /// Most candidates that are judged per effect that may be named: who asks often enough hears a yes.

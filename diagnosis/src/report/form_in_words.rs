@@ -1,7 +1,7 @@
 //! A force of any form in one sentence. Nothing here knows recordings.
 
 use crate::effects::{ForceTable, Variable};
-use crate::numerics::digits::short;
+use numerics::digits::short;
 
 /// Part of a form's mean square that counts as all of it, in words.
 const MOST: f64 = 0.85;

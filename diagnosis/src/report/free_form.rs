@@ -3,13 +3,13 @@
 use crate::effects::Variable;
 use crate::io::rig::Kind;
 use crate::io::schema::FreeForm;
-use crate::numerics::digits::short;
 use crate::pipeline::diagnosis::FreeForce;
 use crate::report::form_in_words;
 use crate::selection::free_form::Shape;
 use html_report::drawing::path;
 use html_report::plot::{close, frame};
 use html_report::safe;
+use numerics::digits::short;
 use std::fmt::Write as _;
 
 /// The form in a sentence without a stop.

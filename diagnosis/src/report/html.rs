@@ -4,13 +4,13 @@
 use crate::io::recording::shown_at;
 use crate::io::rig::Kind;
 use crate::io::schema::{Hypothesis, Named, Verdict};
-use crate::numerics::digits::short;
 use crate::report::free_form;
 use crate::report::motion_picture;
 use crate::report::outcome::{Outcome, unit};
 use crate::report::residual_plots::{over_states, over_time};
 use crate::report::simulation_page;
 use html_report::safe;
+use numerics::digits::short;
 use std::fmt::Write as _;
 
 /// The page.

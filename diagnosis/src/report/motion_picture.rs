@@ -1,11 +1,11 @@
 //! The picture of "simulation and recording differ": the motions side by side, drawn, tabulated and
 //! as a file.
 
-use crate::numerics::digits::short;
 use crate::simulation::comparison::{AFRESH_S, Comparison, Figures, Off, Simulated};
 use html_report::drawing::path;
 use html_report::plot::{HIGH, close, frame};
 use html_report::safe;
+use numerics::digits::short;
 use std::fmt::Write as _;
 
 /// Points that a line is drawn with.

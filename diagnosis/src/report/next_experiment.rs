@@ -1,8 +1,8 @@
 //! The recording to make next: the experiment that would separate two effects, or show one at all.
 
 use crate::effects::{EffectName as N, experiments};
-use crate::numerics::digits::short_within;
 use crate::validation::known_travel::BeyondFitted;
+use numerics::digits::short_within;
 
 /// The recording that would decide within a class.
 pub(crate) fn separating(class: &[N]) -> Option<String> {

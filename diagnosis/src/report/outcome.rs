@@ -3,7 +3,6 @@
 use crate::effects::EffectName;
 use crate::io::rig::{Kind, Rig};
 use crate::io::schema::{Both, Contending, FitTable, Hypothesis, Named, Report, Untested, Verdict};
-use crate::numerics::digits::in_sentence;
 use crate::pipeline::diagnosis::{
     Complete, Contender, Diagnosis, JudgedHypothesis, NamedEffect, Reason, Rigs, Series,
 };
@@ -11,6 +10,7 @@ use crate::report::{free_form, next_experiment, notes, remains, text};
 use crate::selection::free_form::Shape;
 use crate::simulation::comparison::Comparison;
 use crate::validation::residual_maps::Map;
+use numerics::digits::in_sentence;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 

@@ -1,10 +1,10 @@
 //! The page of `simulate`: the sentence, simulated against recorded motion, force, and what to do
 //! next.
 
-use crate::numerics::digits::short;
 use crate::report::motion_picture::{force, free_run, in_windows, scale, table, under_reference, words};
 use crate::simulation::comparison::{Comparison, Simulated};
 use html_report::{document, plot, safe};
+use numerics::digits::short;
 use std::fmt::Write as _;
 
 /// The length of the windows by which models are compared in a sentence, s, where they were run:

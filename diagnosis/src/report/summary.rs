@@ -3,8 +3,8 @@
 use crate::effects::EffectName;
 use crate::io::recording::shown_at;
 use crate::io::schema::ByModel;
-use crate::numerics::digits::short;
 use crate::report::outcome::Outcome;
+use numerics::digits::short;
 use std::fmt::Write as _;
 
 impl Outcome {

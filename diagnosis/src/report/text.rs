@@ -1,12 +1,12 @@
 //! The clauses of a report that say why an effect is not named, and why nothing is; `outcome` makes
 //! the headline. Nothing reads one to decide.
 
-use crate::numerics::bootstrap::Gain;
-use crate::numerics::digits::{in_sentence, short};
 use crate::pipeline::diagnosis::Reason;
 use crate::selection::untested::NotTested;
 use crate::thresholds::{CERTAIN_Z, LEAST_SHARE, MATERIAL, SURE_Z, UNLIKELY_Z, UNSURE_SHARE};
 use crate::validation::rejection::{Rather, Rejection, Weakness};
+use numerics::bootstrap::Gain;
+use numerics::digits::{in_sentence, short};
 
 /// Says why an effect is not named, as a clause.
 pub(crate) fn rejection(why: &Rejection) -> String {

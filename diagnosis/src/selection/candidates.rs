@@ -6,8 +6,8 @@ use crate::effects::{Effect, EffectName as N};
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::nominal::Nominal;
 use crate::io::rig::Kind;
-use crate::numerics::linear::correlation;
 use crate::thresholds::{AT_END, BRISTLES};
+use numerics::linear::correlation;
 use std::f64::consts::TAU;
 
 /// Correlation of tilt and angle from which they count as the same.

@@ -11,8 +11,8 @@ use crate::estimation::force_residual::Estimator;
 use crate::estimation::model::Model;
 use crate::estimation::noise::{self, Colour};
 use crate::estimation::nominal::Nominal;
-use crate::numerics::parallel;
 use crate::selection::candidates;
+use numerics::parallel;
 
 /// A model fitted with the noise that goes with it.
 pub(crate) struct FittedModel {

@@ -7,10 +7,10 @@ use crate::estimation::filter::Noise;
 use crate::estimation::fit::Fit;
 use crate::estimation::model::Model;
 use crate::estimation::noise::Colour;
-use crate::numerics::parallel;
 use crate::selection::candidates;
 use crate::selection::context::{FitContext, FittedModel};
 use crate::selection::shape_search::descend;
+use numerics::parallel;
 
 /// From how many of the best places a search goes downhill, and how many of the ends are settled.
 const STARTS: usize = 4;

@@ -9,13 +9,13 @@ use crate::estimation::fit::Fit;
 use crate::estimation::input::Input;
 use crate::estimation::model::Model;
 use crate::estimation::nominal::Nominal;
-use crate::numerics::golden_section::golden;
-use crate::numerics::linear::dot;
-use crate::numerics::linear::{Factor, Square};
-use crate::numerics::parallel;
 use crate::selection::context::FitContext;
 use crate::selection::score_statistic::{ScoreSums, Terms, project};
 use crate::selection::wave_ladder::{self, Means};
+use numerics::golden_section::golden;
+use numerics::linear::dot;
+use numerics::linear::{Factor, Square};
+use numerics::parallel;
 use std::f64::consts::TAU;
 
 /// Highest order of a turn that is looked for, and how many orders one effect may have.

@@ -6,7 +6,7 @@
 //! with more freedom pays for it here by itself.
 
 use crate::estimation::fit::{Fit, normal_of};
-use crate::numerics::linear::{Prior, bounded};
+use numerics::linear::{Prior, bounded};
 
 /// Parts that segments are dealt into.
 pub(crate) const FOLDS: usize = 6;
@@ -121,7 +121,7 @@ mod tests {
     fn gain(drag: f64) -> f64 {
         let rig = Rig::of_values(0.01, 0.0, 0.0);
         let (h, rows) = (1e-3, 12_000);
-        let mut random = crate::numerics::bootstrap::Random::new(5);
+        let mut random = numerics::bootstrap::Random::new(5);
         let (mut x, mut v) = (0.0, 0.0);
         let mut recording = Recording::default();
         for i in 0..rows {
@@ -155,7 +155,7 @@ mod tests {
 
     #[test]
     fn a_strong_rare_gain_is_sure_and_one_within_noise_is_not() {
-        let mut random = crate::numerics::bootstrap::Random::new(3);
+        let mut random = numerics::bootstrap::Random::new(3);
         let mut noise = || (0..12).map(|_| random.below(1001) as f64 / 1000.0).sum::<f64>() - 6.0;
         let quiet: Vec<f64> = (0..6000).map(|_| noise()).collect();
         let plus = |of: &dyn Fn(usize) -> f64| -> Vec<f64> {

@@ -9,10 +9,10 @@ use crate::estimation::input::Input;
 use crate::estimation::model::Model;
 use crate::estimation::nominal::Nominal;
 use crate::estimation::regressors::effect_inputs;
-use crate::numerics::linear::dot;
-use crate::numerics::linear::{Factor, Square};
-use crate::numerics::parallel;
 use crate::selection::context::PER_COEFFICIENT;
+use numerics::linear::dot;
+use numerics::linear::{Factor, Square};
+use numerics::parallel;
 
 /// The result of a score test.
 #[derive(Debug, Clone)]

@@ -6,14 +6,14 @@ use crate::effects::{Effect, EffectName as N};
 use crate::estimation::fit::Fit;
 use crate::estimation::model::Model;
 use crate::estimation::noise::Colour;
-use crate::numerics::golden_section::golden;
-use crate::numerics::parallel;
 use crate::selection::candidates;
 use crate::selection::context::{FitContext, FittedModel, cost};
 use crate::selection::joint;
 use crate::selection::periodic::{self, Searched};
 use crate::selection::score_statistic;
 use crate::selection::shape_search::descend;
+use numerics::golden_section::golden;
+use numerics::parallel;
 
 /// The number of effects that are fitted in full at each step.
 const FINALISTS: usize = 8;

@@ -5,11 +5,11 @@ use crate::estimation::filter::Noise;
 use crate::estimation::fit::Fit;
 use crate::estimation::input::Input;
 use crate::estimation::model::{Model, total};
-use crate::numerics::linear::Factor;
-use crate::numerics::parallel;
 use crate::selection::candidates;
 use crate::selection::context::FitContext;
 use crate::selection::score_statistic::{Terms, project};
+use numerics::linear::Factor;
+use numerics::parallel;
 
 /// Most steps, and the longest, as a change of a value's logarithm.
 const STEPS: usize = 6;

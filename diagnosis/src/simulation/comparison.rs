@@ -5,7 +5,7 @@ use super::replay::{Beside, Deviation, Trajectory};
 use super::{Motion, PositionLoop};
 use crate::io::recording::Recording;
 use crate::io::rig::{Kind, Rig};
-use crate::numerics::parallel;
+use numerics::parallel;
 use serde::Serialize;
 
 /// One model compared with a recording.
@@ -145,8 +145,8 @@ impl Comparison {
             said.push(format!(
                 "over the whole of {} it is {} {unit} off instead of {}",
                 self.file,
-                crate::numerics::digits::short(a.free_run.position_rms),
-                crate::numerics::digits::short(b.free_run.position_rms)
+                numerics::digits::short(a.free_run.position_rms),
+                numerics::digits::short(b.free_run.position_rms)
             ));
         }
         let worse: Vec<String> = a

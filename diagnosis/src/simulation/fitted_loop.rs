@@ -3,7 +3,7 @@
 
 use super::Motion;
 use crate::io::recording::Recording;
-use crate::numerics::linear::{Factor, Square};
+use numerics::linear::{Factor, Square};
 
 /// Part of the command's variance that a loop has to explain to be believed.
 const BELIEVED: f64 = 0.5;

@@ -6,8 +6,8 @@
 use super::replay::Beside;
 use crate::io::recording::Recording;
 use crate::io::rig::Rig;
-use crate::numerics::linear::{Factor, Square, dot};
-use crate::numerics::parallel;
+use numerics::linear::{Factor, Square, dot};
+use numerics::parallel;
 
 /// Most iterations, and change of the sum of squares below which it is over.
 const ITERATIONS: usize = 30;

@@ -2,13 +2,13 @@
 //! meet to be named. Nothing here fits or chooses between effects.
 
 use crate::effects::{Effect, EffectName};
-use crate::numerics::bootstrap::Gain;
 use crate::thresholds::{
     CERTAIN_Z, FAIR_SHARE, HALF_OF_FORCE, HARDLY_ANOTHER_SIZE, HARMLESS, LEAST_SHARE, MATERIAL, MOST_SHARE,
     NEARLY_ALL_SHARE, PROMISING_Z, SAME_SIZE, SHARE, SURE_Z, UNLIKELY_Z, UNSURE_SHARE, WORSE_Z,
 };
 use crate::validation::rejection::Rejection;
 use crate::validation::shares::material::Material;
+use numerics::bootstrap::Gain;
 use std::ops::Range;
 
 /// An effect as it came through the search, before it is judged.

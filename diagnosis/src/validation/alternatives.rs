@@ -9,8 +9,6 @@ use crate::estimation::model::Model;
 use crate::estimation::noise::Colour;
 use crate::estimation::nominal::Nominal;
 use crate::io::rig::Kind;
-use crate::numerics::bootstrap::bootstrap;
-use crate::numerics::parallel;
 use crate::selection::context::{FitContext, FittedModel};
 use crate::selection::excitation::Excitation;
 use crate::selection::predictive::left_out_costs;
@@ -22,6 +20,8 @@ use crate::validation::holdout_likelihood::evaluate_all;
 use crate::validation::holdout_set::HoldoutSet;
 use crate::validation::known_travel::known;
 use crate::validation::parameters;
+use numerics::bootstrap::bootstrap;
+use numerics::parallel;
 
 /// The number of rivals of each effect that are fitted in full.
 const RIVALS: usize = 4;

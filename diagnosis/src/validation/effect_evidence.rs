@@ -9,7 +9,6 @@ use crate::estimation::force_residual::Estimator;
 use crate::estimation::input::Total;
 use crate::estimation::model::Model;
 use crate::estimation::nominal::Key;
-use crate::numerics::bootstrap::bootstrap;
 use crate::selection::candidates;
 use crate::selection::comb;
 use crate::selection::context::{FitContext, FittedModel};
@@ -21,6 +20,7 @@ use crate::validation::holdout_set::HoldoutSet;
 use crate::validation::parameters;
 use crate::validation::residuals::{above, forces, relative_gain};
 use crate::validation::sizes::{played, sizes_on};
+use numerics::bootstrap::bootstrap;
 
 /// Least part of a refit's mean square that counts as above the noise: the noise itself is not
 /// known exactly.

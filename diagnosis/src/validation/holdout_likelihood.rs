@@ -9,12 +9,12 @@ use crate::estimation::fit::{Fit, Prepared};
 use crate::estimation::input::Total;
 use crate::estimation::model::{Model, total};
 use crate::estimation::nominal::{Key, Nominal};
-use crate::numerics::bootstrap::{Gain, bootstrap};
-use crate::numerics::linear::Square;
-use crate::numerics::parallel;
 use crate::selection::context::FittedModel;
 use crate::selection::joint;
 use crate::selection::predictive::{FOLDS, fold_of};
+use numerics::bootstrap::{Gain, bootstrap};
+use numerics::linear::Square;
+use numerics::parallel;
 
 /// A model laid on one held-out recording.
 pub(crate) struct HoldoutFit {
@@ -110,7 +110,7 @@ fn best_shift(period: f64, highest: f64, value: impl Fn(f64) -> f64) -> f64 {
         }
     }
     let width = period / count as f64;
-    crate::numerics::golden_section::golden(at(best.0) - width, at(best.0) + width, 12, value)
+    numerics::golden_section::golden(at(best.0) - width, at(best.0) + width, 12, value)
 }
 
 /// Lays a fitted model on a held-out recording under a noise.

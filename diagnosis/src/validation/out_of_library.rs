@@ -8,12 +8,12 @@ use crate::effects::{Effect, EffectName};
 use crate::estimation::fit::Fit;
 use crate::estimation::model::Model;
 use crate::estimation::noise::Colour;
-use crate::numerics::parallel;
 use crate::selection::context::{FitContext, FittedModel, PER_COEFFICIENT};
 use crate::thresholds::{OUTSIDE_ALONE, OUTSIDE_PART};
 use crate::validation::effect_evidence::gather_evidence;
 use crate::validation::holdout_set::HoldoutSet;
 use crate::validation::rejection::Rather;
+use numerics::parallel;
 
 /// Physics without a name that may look like a fitted effect; all there is where nothing is fitted.
 pub(crate) fn unnamed_like(fitted: Option<&Effect>, context: &FitContext) -> Vec<Unnamed> {

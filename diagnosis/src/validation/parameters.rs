@@ -6,9 +6,9 @@ use crate::effects::{Effect, EffectName as N};
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::nominal::{Key, Nominal};
 use crate::io::schema::Parameter;
-use crate::numerics::linear::Square;
 use crate::selection::context::{FitContext, FittedModel};
 use crate::validation::rejection::Rejection;
+use numerics::linear::Square;
 use std::collections::BTreeMap;
 
 /// Inertia and gain that go with a fitted ratio of the two, by what the rig declares of each; and

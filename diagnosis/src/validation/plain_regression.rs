@@ -4,9 +4,9 @@
 
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::force_residual::Estimator;
-use crate::numerics::linear::{Factor, Square};
 use crate::thresholds::SURE_Z;
 use crate::validation::residuals::{Residuals, relative_gain};
+use numerics::linear::{Factor, Square};
 use std::f64::consts::TAU;
 
 /// Part of the residual's mean square that a regression must predict on held-out recordings.

@@ -2,8 +2,8 @@
 //! `report::text` turns it into a sentence.
 
 use crate::effects::EffectName;
-use crate::numerics::bootstrap::Gain;
 use crate::selection::free_form::Inputs;
+use numerics::bootstrap::Gain;
 
 /// The reason why an effect is not named.
 #[derive(Debug, Clone, PartialEq)]

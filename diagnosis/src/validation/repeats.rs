@@ -6,7 +6,7 @@
 //! from outside does not know when the motion repeats.
 
 use crate::estimation::blocked_recording::BlockedRecording;
-use crate::numerics::linear::correlation;
+use numerics::linear::correlation;
 
 /// The smallest correlation of the motion at which one stretch repeats another.
 const SAME_MOTION: f64 = 0.97;
@@ -110,7 +110,7 @@ mod tests {
     use super::*;
     use crate::io::recording::Recording;
     use crate::io::rig::Rig;
-    use crate::numerics::bootstrap::Random;
+    use numerics::bootstrap::Random;
     use std::sync::Arc;
 
     /// A motion to and fro that starts `late`, with a residual of time since its start.

@@ -2,7 +2,7 @@
 //! recordings, and intervals of time.
 
 use crate::estimation::blocked_recording::BlockedRecording;
-use crate::numerics::bootstrap::{Gain, bootstrap};
+use numerics::bootstrap::{Gain, bootstrap};
 
 /// A residual averaged over bins of a variable, moving forward and backward apart.
 #[derive(Debug, Clone)]
@@ -256,7 +256,7 @@ mod tests {
         assert!(repeats(&[stiffness(), stiffness()]));
         assert!(!repeats(&[stiffness(), seen(|x, _| -x)]));
         let random = |seed: u64| {
-            let mut random = crate::numerics::bootstrap::Random::new(seed);
+            let mut random = numerics::bootstrap::Random::new(seed);
             let steps: Vec<f64> = (0..40).map(|_| random.below(2001) as f64 / 1000.0 - 1.0).collect();
             seen(move |_, t| steps[(t * 3.0) as usize])
         };

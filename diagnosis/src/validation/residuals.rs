@@ -6,10 +6,10 @@ use crate::estimation::force_residual::Estimator;
 use crate::estimation::input::Total;
 use crate::estimation::model::total;
 use crate::estimation::nominal::Nominal;
-use crate::numerics::bootstrap::{Gain, bootstrap};
 use crate::selection::context::FittedModel;
 use crate::validation::holdout_likelihood::evaluate_all;
 use crate::validation::parameters;
+use numerics::bootstrap::{Gain, bootstrap};
 
 /// Residual force of a model over recordings, per block.
 pub(crate) fn forces(

@@ -4,9 +4,9 @@
 
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::force_residual::Estimator;
-use crate::numerics::golden_section::golden;
-use crate::numerics::parallel;
 use crate::thresholds::MISTAKEN;
+use numerics::golden_section::golden;
+use numerics::parallel;
 use std::f64::consts::TAU;
 
 /// Samples per second that the search looks at, over the bandwidth of the residual.

@@ -1,7 +1,7 @@
 //! The description of an effect in a report.
 
 use crate::effects::{Effect, EffectName, Subsystem};
-use crate::numerics::linear::Square;
+use numerics::linear::Square;
 
 /// A fitted effect, from which its values are reported.
 pub(crate) struct Fitted<'a> {

@@ -5,7 +5,7 @@ use crate::estimation::model::Model;
 use crate::estimation::nominal::Nominal;
 use crate::io::recording::Recording;
 use crate::io::rig::Rig;
-use crate::numerics::bootstrap::Random;
+use numerics::bootstrap::Random;
 
 #[test]
 fn two_parts_of_one_jump_agree_in_sign() {

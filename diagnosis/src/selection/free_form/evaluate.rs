@@ -10,8 +10,8 @@ use crate::estimation::fit::{Prepared, layout};
 use crate::estimation::input::Input;
 use crate::estimation::model::Model;
 use crate::estimation::nominal::{Key, Nominal};
-use crate::numerics::linear::{Factor, Square, dot};
-use crate::numerics::parallel;
+use numerics::linear::{Factor, Square, dot};
+use numerics::parallel;
 
 /// Segments that are scored together, and such units that are left out together.
 const TOGETHER: usize = 3;

@@ -3,7 +3,7 @@
 
 use super::basis::{Basis, Inputs, Point, Warp, Warps};
 use crate::effects::{ForceTable, Variable};
-use crate::numerics::linear::Square;
+use numerics::linear::Square;
 
 /// A force over a grid.
 #[derive(Debug, Clone)]

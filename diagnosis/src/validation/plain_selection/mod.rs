@@ -16,9 +16,9 @@ use crate::effects::EffectName;
 use crate::effects::plain_laws::{PlainLaw, PlainMotion, PlainRig, plain_laws};
 use crate::io::recording::Recording;
 use crate::io::rig::{Kind, Rig};
-use crate::numerics::parallel;
 use crate::thresholds::{PLAIN_SAME_SIZE, PLAIN_SHARE};
 use axis::Axis;
+use numerics::parallel;
 use regression::{Block, left_on, left_out, solve};
 use std::sync::Arc;
 

@@ -1,6 +1,6 @@
 //! Least squares of the equation of motion in one band, with stretches left out in turn.
 
-use crate::numerics::linear::{Factor, Square};
+use numerics::linear::{Factor, Square};
 
 /// Folds of stretches of time, and stretches of a recording.
 const FOLDS: usize = 5;

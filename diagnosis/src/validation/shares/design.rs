@@ -2,8 +2,8 @@
 
 use super::laws::Columns;
 use super::sight::Sight;
-use crate::numerics::linear::{Prior, Square, bounded, dot};
 use crate::selection::predictive::FOLDS;
+use numerics::linear::{Prior, Square, bounded, dot};
 
 /// Number of correlated rows that carry as much information as one independent row; the priors are
 /// weighed accordingly.

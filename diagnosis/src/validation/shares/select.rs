@@ -7,10 +7,10 @@ pub(crate) use super::state::Selection;
 use super::state::State;
 use crate::effects::definition::{NominalTerm, Unnamed};
 use crate::effects::{Effect, EffectName as N};
-use crate::numerics::parallel;
 use crate::selection::context::MOST;
 use crate::thresholds::{AS_GOOD, FORM_LEAVES, NAMED_SHARE, TAKEN_SHARE};
 use crate::validation::out_of_library::unnamed_like;
+use numerics::parallel;
 
 /// Additional share that a rival must take to replace an effect.
 const SURELY: f64 = 0.01;

@@ -7,8 +7,8 @@ use crate::estimation::force_residual::Estimator;
 use crate::estimation::input::{Input, Total};
 use crate::estimation::model::Model;
 use crate::estimation::nominal::{Key, Nominal};
-use crate::numerics::linear::Prior;
 use crate::selection::predictive::fold_of;
+use numerics::linear::Prior;
 
 /// Rows per period of the highest frequency of the band; more add no information.
 const ROWS_PER_PERIOD: f64 = 4.0;

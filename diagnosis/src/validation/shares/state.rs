@@ -8,11 +8,11 @@ use crate::effects::{Effect, EffectName as N};
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::filter::Noise;
 use crate::estimation::force_residual::Estimator;
-use crate::numerics::linear::Prior;
-use crate::numerics::parallel;
 use crate::selection::candidates;
 use crate::selection::context::FitContext;
 use crate::selection::periodic::{self, Searched};
+use numerics::linear::Prior;
+use numerics::parallel;
 
 /// Factors by which a value of a shape is moved, a pair in each round.
 const MOVES: [[f64; 2]; 3] = [[0.5, 2.0], [0.7, 1.4], [0.85, 1.18]];

@@ -1,7 +1,7 @@
 //! One-dimensional searches and grids.
 
 /// Golden-section search for the largest value.
-pub(crate) fn golden(mut a: f64, mut b: f64, steps: usize, f: impl Fn(f64) -> f64) -> f64 {
+pub fn golden(mut a: f64, mut b: f64, steps: usize, f: impl Fn(f64) -> f64) -> f64 {
     let ratio = 0.5 * (5.0_f64.sqrt() - 1.0);
     let (mut x, mut y) = (b - ratio * (b - a), a + ratio * (b - a));
     let (mut fx, mut fy) = (f(x), f(y));
@@ -20,7 +20,7 @@ pub(crate) fn golden(mut a: f64, mut b: f64, steps: usize, f: impl Fn(f64) -> f6
 }
 
 /// `count` values from `from` to `to`, evenly spaced in their logarithm.
-pub(crate) fn logarithmic(from: f64, to: f64, count: usize) -> Vec<f64> {
+pub fn logarithmic(from: f64, to: f64, count: usize) -> Vec<f64> {
     if from.is_nan() || to.is_nan() || from <= 0.0 || to <= from || count < 2 {
         return if to > 0.0 { vec![to] } else { Vec::new() };
     }

@@ -2,19 +2,24 @@
 
 /// A square symmetric matrix, row by row.
 #[derive(Debug, Clone)]
-pub(crate) struct Square {
-    pub(crate) n: usize,
-    pub(crate) a: Vec<f64>,
+pub struct Square {
+    /// Rows, as many as columns.
+    pub n: usize,
+    /// `n`² entries, row by row.
+    pub a: Vec<f64>,
 }
 
 impl Square {
-    pub(crate) fn zero(n: usize) -> Self {
+    /// Returns a matrix of zeros.
+    pub fn zero(n: usize) -> Self {
         Self { n, a: vec![0.0; n * n] }
     }
-    pub(crate) fn at(&self, i: usize, j: usize) -> f64 {
+    /// Returns the entry of a row and a column.
+    pub fn at(&self, i: usize, j: usize) -> f64 {
         self.a[i * self.n + j]
     }
-    pub(crate) fn add(&mut self, i: usize, j: usize, x: f64) {
+    /// Adds to the entry of a row and a column.
+    pub fn add(&mut self, i: usize, j: usize, x: f64) {
         self.a[i * self.n + j] += x;
     }
 }
@@ -22,7 +27,7 @@ impl Square {
 /// Cholesky factor of a symmetric matrix scaled to a unit diagonal; directions without information
 /// are left out.
 #[derive(Debug, Clone)]
-pub(crate) struct Factor {
+pub struct Factor {
     n: usize,
     l: Vec<f64>,
     scale: Vec<f64>,
@@ -33,7 +38,8 @@ pub(crate) struct Factor {
 const PIVOT: f64 = 1e-10;
 
 impl Factor {
-    pub(crate) fn new(m: &Square) -> Self {
+    /// Factors `m`, whose lower half is read.
+    pub fn new(m: &Square) -> Self {
         let n = m.n;
         let scale: Vec<f64> = (0..n)
             .map(|i| m.at(i, i))
@@ -65,12 +71,13 @@ impl Factor {
     }
 
     /// Logarithm of the determinant, without the directions that carry no information.
-    pub(crate) fn log_det(&self) -> f64 {
+    pub fn log_det(&self) -> f64 {
         let live = (0..self.n).filter(|i| self.live[*i]);
         live.map(|i| 2.0 * (self.l[i * self.n + i] / self.scale[i]).ln()).sum()
     }
 
-    pub(crate) fn solve(&self, b: &[f64]) -> Vec<f64> {
+    /// Solves for a right-hand side; zero in directions without information.
+    pub fn solve(&self, b: &[f64]) -> Vec<f64> {
         let n = self.n;
         let mut x: Vec<f64> = b.iter().zip(&self.scale).map(|(b, s)| b * s).collect();
         for i in 0..n {
@@ -96,7 +103,7 @@ impl Factor {
     }
 
     /// The inverse, zero in directions without information.
-    pub(crate) fn inverse(&self) -> Square {
+    pub fn inverse(&self) -> Square {
         let mut out = Square::zero(self.n);
         for j in 0..self.n {
             let mut unit = vec![0.0; self.n];
@@ -111,7 +118,7 @@ impl Factor {
 }
 
 /// Inner product of two stretches.
-pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
+pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     // Four partial sums in a fixed order: fast, and the same on every machine and thread count.
     let mut sum = [0.0; 4];
     let (a4, b4) = (a.chunks_exact(4), b.chunks_exact(4));
@@ -125,7 +132,7 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
 }
 
 /// Correlation of two signals of the same length; zero where one does not vary.
-pub(crate) fn correlation(a: &[f64], b: &[f64]) -> f64 {
+pub fn correlation(a: &[f64], b: &[f64]) -> f64 {
     let n = a.len().min(b.len()).max(1) as f64;
     let mean = |x: &[f64]| x.iter().sum::<f64>() / n;
     let (ma, mb) = (mean(a), mean(b));
@@ -141,29 +148,33 @@ pub(crate) fn correlation(a: &[f64], b: &[f64]) -> f64 {
 
 /// The prior of a coefficient, with its bounds.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Prior {
-    pub(crate) mean: f64,
+pub struct Prior {
+    /// Expected value.
+    pub mean: f64,
     /// Infinite where nothing is known.
-    pub(crate) sd: f64,
-    pub(crate) low: f64,
-    pub(crate) high: f64,
+    pub sd: f64,
+    /// Smallest value allowed.
+    pub low: f64,
+    /// Largest value allowed.
+    pub high: f64,
 }
 
 impl Prior {
-    pub(crate) const FREE: Self =
-        Self { mean: 0.0, sd: f64::INFINITY, low: f64::NEG_INFINITY, high: f64::INFINITY };
+    /// Nothing is known, nothing is forbidden.
+    pub const FREE: Self = Self { mean: 0.0, sd: f64::INFINITY, low: f64::NEG_INFINITY, high: f64::INFINITY };
 }
 
 /// The answer of [`bounded`].
 #[derive(Debug, Clone)]
-pub(crate) struct Solution {
-    pub(crate) x: Vec<f64>,
+pub struct Solution {
+    /// The coefficients.
+    pub x: Vec<f64>,
     /// True if a coefficient is at a bound.
-    pub(crate) bound: Vec<bool>,
+    pub bound: Vec<bool>,
     /// Covariance with the prior, for unit residual variance; zero at bounds.
-    pub(crate) covariance: Square,
+    pub covariance: Square,
     /// ½·prior square.
-    pub(crate) prior_cost: f64,
+    pub prior_cost: f64,
 }
 
 /// Solves for the coefficients that are not fixed; gives their places, the factor of their matrix
@@ -200,7 +211,7 @@ fn worst_outside(free: &[usize], x: &[f64], priors: &[Prior]) -> Option<usize> {
 }
 
 /// Minimises ½ xᵀMx − bᵀx plus the priors within bounds, by an active set.
-pub(crate) fn bounded(m: &Square, b: &[f64], priors: &[Prior]) -> Solution {
+pub fn bounded(m: &Square, b: &[f64], priors: &[Prior]) -> Solution {
     let n = m.n;
     let mut full = m.clone();
     let mut right = b.to_vec();

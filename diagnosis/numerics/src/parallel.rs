@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use std::sync::Mutex;
 
 /// The results of `work` on 0 to `count` − 1, in order.
-pub(crate) fn map<R: Send>(count: usize, work: impl Fn(usize) -> R + Sync) -> Vec<R> {
+pub fn map<R: Send>(count: usize, work: impl Fn(usize) -> R + Sync) -> Vec<R> {
     let slots: Vec<Mutex<Option<R>>> = (0..count).map(|_| Mutex::new(None)).collect();
     share(count, &|index| {
         let result = work(index);
@@ -17,7 +17,7 @@ pub(crate) fn map<R: Send>(count: usize, work: impl Fn(usize) -> R + Sync) -> Ve
 }
 
 /// The results of `work` on each item, in order.
-pub(crate) fn map_all<T: Sync, R: Send>(items: &[T], work: impl Fn(&T) -> R + Sync) -> Vec<R> {
+pub fn map_all<T: Sync, R: Send>(items: &[T], work: impl Fn(&T) -> R + Sync) -> Vec<R> {
     map(items.len(), |index| work(&items[index]))
 }
 

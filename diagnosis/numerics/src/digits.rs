@@ -1,7 +1,7 @@
 //! Numbers as people read them.
 
 /// Returns a number with four significant digits.
-pub(crate) fn short(x: f64) -> String {
+pub fn short(x: f64) -> String {
     if x == 0.0 {
         return "0".into();
     }
@@ -14,12 +14,12 @@ pub(crate) fn short(x: f64) -> String {
 }
 
 /// Returns the same; zero where it is less than a thousandth of a range.
-pub(crate) fn short_within(x: f64, range: f64) -> String {
+pub fn short_within(x: f64, range: f64) -> String {
     short(if x.abs() < 1e-3 * range { 0.0 } else { x })
 }
 
 /// Returns a number with at most three significant digits, for a sentence.
-pub(crate) fn in_sentence(x: f64) -> String {
+pub fn in_sentence(x: f64) -> String {
     let magnitude = if x == 0.0 { 0.0 } else { x.abs().log10().floor() };
     if !(-4.0..6.0).contains(&magnitude) {
         return format!("{x:.2e}");

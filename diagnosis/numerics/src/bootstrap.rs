@@ -2,13 +2,15 @@
 //! machine.
 
 /// Deterministic pseudo-random numbers (xorshift64*), seeded by a constant.
-pub(crate) struct Random(u64);
+pub struct Random(u64);
 
 impl Random {
-    pub(crate) fn new(seed: u64) -> Self {
+    /// Starts the sequence of a seed.
+    pub fn new(seed: u64) -> Self {
         Self(seed | 1)
     }
-    pub(crate) fn below(&mut self, n: usize) -> usize {
+    /// Returns the next number from 0 to `n` − 1.
+    pub fn below(&mut self, n: usize) -> usize {
         self.0 ^= self.0 >> 12;
         self.0 ^= self.0 << 25;
         self.0 ^= self.0 >> 27;
@@ -18,15 +20,18 @@ impl Random {
 
 /// Gain over segments: mean, its standard error, and a bootstrap interval of the sum.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Gain {
-    pub(crate) sum: f64,
-    pub(crate) low: f64,
-    pub(crate) high: f64,
+pub struct Gain {
+    /// The sum of all segments.
+    pub sum: f64,
+    /// Its bootstrap interval of 95 % begins here …
+    pub low: f64,
+    /// … and ends here.
+    pub high: f64,
     /// Mean over standard error; neighbours are taken together so that what lasts longer than a
     /// segment counts once.
-    pub(crate) z: f64,
+    pub z: f64,
     /// The same with the gain of each block limited.
-    pub(crate) clipped_z: f64,
+    pub clipped_z: f64,
 }
 
 /// Resamplings of the bootstrap.
@@ -39,7 +44,7 @@ const SUREST: f64 = 100.0;
 const TOGETHER: usize = 3;
 
 /// Sum of gains with a block-bootstrap interval of 95 %.
-pub(crate) fn bootstrap(gains: &[f64]) -> Gain {
+pub fn bootstrap(gains: &[f64]) -> Gain {
     let blocks: Vec<f64> = gains.chunks(TOGETHER).map(|c| c.iter().sum()).collect();
     let n = blocks.len();
     let sum: f64 = blocks.iter().sum();
