@@ -2,6 +2,7 @@
 
 pub(crate) mod bootstrap;
 pub(crate) mod digits;
+pub(crate) mod even_grid;
 pub(crate) mod golden_section;
 pub(crate) mod linear;
 pub(crate) mod parallel;

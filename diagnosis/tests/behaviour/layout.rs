@@ -6,11 +6,12 @@ use std::path::{Path, PathBuf};
 
 /// Folders from the bottom to the top. Folders are counted, not files as in the small crates of
 /// host-sim: an arrow within a folder stays within its subject.
-const FLOORS: [&str; 9] = [
+const FLOORS: [&str; 10] = [
     "numerics",
     "effects",
     "io",
     "simulation",
+    "data_faults",
     "estimation",
     "selection",
     "validation",
