@@ -6,16 +6,17 @@
 //! were not used for fitting, and reports. This crate knows rigs and recordings; it may not know
 //! devices, links or plots of other crates.
 //!
-//! Folders, each using only those before it: `effects` (the laws), `io` (rigs, recordings, the
-//! report's shape), `simulation` (a rig run forward), `estimation` (blocks, filter, noise, fit), `selection` (candidates and their shapes),
-//! `validation` (held-out recordings), `pipeline` (the stages, one after another) and `report`
-//! (sentences, pages and files). `tests/behaviour/layout.rs` checks this, and that no files use
-//! each other in a circle. The numbers that admit or reject a name are in `thresholds`, which every
-//! folder may read.
+//! Folders, each using only those before it: `effects` (the laws), `io` (rigs, recordings, the report's shape), `simulation` (a rig run
+//! forward), `data_faults` (faults of the logs), `estimation` (blocks, filter, noise, fit),
+//! `selection` (candidates and their shapes), `validation` (held-out recordings), `pipeline` (the
+//! stages, one after another) and `report` (sentences, pages and files).
+//! `tests/behaviour/layout.rs` checks this, and that no files use each other in a circle. The
+//! numbers that admit or reject a name are in `thresholds`, which every folder may read.
 
 // Matrices are read by row and column.
 #![allow(clippy::needless_range_loop)]
 
+mod data_faults;
 pub mod effects;
 mod estimation;
 mod io;
@@ -30,7 +31,7 @@ pub use io::error::InputError;
 pub use io::{recording, rig};
 pub use pipeline::diagnosis::Series;
 pub use report::outcome::{Evidence, Made, Outcome};
-pub use report::{Report, Verdict};
+pub use report::{DataFault, FaultKind, Report, Verdict};
 pub use validation::residual_maps::Map;
 
 use recording::Recording;
@@ -72,6 +73,12 @@ pub fn diagnose(request: &Request, progress: &(dyn Fn(&str, f64) + Sync)) -> Res
     diagnose_recordings(&rig, &fit, &holdout, progress)
 }
 
+/// The faults of recordings that are seen before any law is searched, as a diagnosis takes them
+/// out.
+pub fn data_faults(rig: &Rig, fit: &[Recording], holdout: &[Recording]) -> Vec<DataFault> {
+    data_faults::check(rig, fit, holdout).faults
+}
+
 /// Diagnoses recordings that are already read; an error where one cannot be used, as where a unit
 /// or a sign is wrong.
 pub fn diagnose_recordings(
@@ -80,7 +87,9 @@ pub fn diagnose_recordings(
     holdout: &[Recording],
     progress: &(dyn Fn(&str, f64) + Sync),
 ) -> Result<Outcome, InputError> {
-    let outcome = Outcome::of(pipeline::run(rig, fit, holdout, progress)?);
+    let checked = data_faults::check(rig, fit, holdout);
+    let mut outcome = Outcome::of(pipeline::run(rig, &checked, progress)?);
+    outcome.report.data_faults = checked.faults;
     progress("done", 1.0);
     Ok(outcome)
 }

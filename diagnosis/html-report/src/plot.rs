@@ -14,7 +14,9 @@ pub const SCRIPT: &str = include_str!("plot.js");
 const WIDE: f64 = 640.0;
 /// The height of a frame, in drawing units: places run from 0 at the top to this.
 pub const HIGH: f64 = 190.0;
-const LEFT: f64 = 72.0;
+/// Room for a tick's label of eight characters, minus sign included, in the large type of small
+/// plots.
+const LEFT: f64 = 96.0;
 const TOP: f64 = 16.0;
 const BOTTOM: f64 = 32.0;
 /// Room between the curves and the frame.
@@ -33,6 +35,19 @@ fn label(value: f64, step: f64) -> String {
     format!("{:.*}", decimals(step), value + 0.0)
 }
 
+/// A range that has a size: a curve of zeros is drawn between -1 and 1.
+fn with_size((low, high): (f64, f64)) -> (f64, f64) {
+    let middle = 0.5 * (low + high);
+    if high - low > f64::EPSILON * middle.abs() && high - low > SMALLEST {
+        (low, high)
+    } else {
+        (middle - 1.0, middle + 1.0)
+    }
+}
+
+/// Nothing that is measured is smaller.
+const SMALLEST: f64 = 1e-100;
+
 /// A frame with its ticks, under the title of its upright axis; returns the mapping of values to
 /// places. [`close`] ends it. `plot.js` reads the ranges and shows the values of the paths that
 /// have a `data-name`.
@@ -44,6 +59,7 @@ pub fn frame(
     y_label: &str,
 ) -> impl Fn(f64, f64) -> (f64, f64) + use<> {
     let (x_label, y_label) = (safe(x_label), safe(y_label));
+    let (x, y) = (with_size(x), with_size(y));
     let _ = write!(
         out,
         "<div class=plot><p class=axis>{y_label}</p><svg viewBox=\"0 -{TOP} {WIDE} {}\" role=img data-of=\"{x_label}\" \
@@ -104,6 +120,25 @@ mod tests {
             assert_eq!(distinct.len(), labels.len(), "{labels:?}");
         }
         assert_eq!([label(0.5, 0.5), label(20.0, 5.0), label(-0.0, 0.1)], ["0.5", "20", "0.0"]);
+    }
+
+    #[test]
+    fn a_label_has_room_for_its_minus_sign() {
+        // A digit is 0.56 as wide as the type is high: 19 units in the small plots of a report.
+        let wide = |text: &str| text.chars().count() as f64 * 0.56 * 19.0;
+        for top in [3.7, 0.81, 0.0141, 7.3e-4, 9.2e-9, 41_000.0, 6.1e7] {
+            let step = round_step(2.0 * top / TICKS);
+            for tick in ticks(-top, top, step) {
+                assert!(wide(&label(tick, step)) < LEFT - 5.0, "{}", label(tick, step));
+            }
+        }
+    }
+
+    #[test]
+    fn a_curve_of_zeros_has_an_axis_that_people_read() {
+        let mut out = String::new();
+        let _ = frame(&mut out, (0.0, 10.0), (-1e-300, 1e-300), "time, s", "force, N");
+        assert!(out.contains("data-y=\"-1e0 1e0\"") && !out.contains("e-30"), "{out}");
     }
 
     #[test]

@@ -5,6 +5,7 @@
 
 pub mod bootstrap;
 pub mod digits;
+pub mod even_grid;
 pub mod golden_section;
 pub mod linear;
 pub mod parallel;

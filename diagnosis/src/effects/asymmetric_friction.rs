@@ -74,6 +74,10 @@ impl EffectLaw for Defined {
 
 impl EffectSearch for Defined {
     fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
+        // Any friction is one that differs with direction where there is one direction.
+        if span.one_way {
+            return Vec::new();
+        }
         let known = [("viscous_only", 1.0)];
         vec![Effect::shaped(name, if span.rig.has_offset { &known } else { &[] })]
     }

@@ -2,7 +2,7 @@
 
 use super::definition::{
     Allowed, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, NominalTerm, POSITIVE, Plain, Reported,
-    Span,
+    Shown, Span,
 };
 use super::joint_terms::JointTerms;
 use super::law::sign;
@@ -47,6 +47,9 @@ impl EffectLaw for Defined {
 impl EffectSearch for Defined {
     fn grid(&self, name: EffectName, _span: &Span) -> Vec<Effect> {
         vec![Effect::shaped(name, &[])]
+    }
+    fn twins(&self, _effect: &Effect, shown: &Shown) -> Vec<EffectName> {
+        shown.one_way.then_some(EffectName::AsymmetricFriction).into_iter().collect()
     }
     fn limits(&self, _term: usize, _allowed: &Allowed) -> (f64, f64) {
         POSITIVE

@@ -94,6 +94,8 @@ pub(crate) struct PlainRig {
     /// Travel of one turn, rad or m, where the axis has turns.
     pub(crate) turn: Option<f64>,
     pub(crate) is_rotary: bool,
+    /// True if the axis moves one way only.
+    pub(crate) one_way: bool,
 }
 
 /// Part of the inclination's mean square by which it has to swing about its mean.
@@ -149,7 +151,9 @@ impl Laws {
         if !rig.has_coulomb {
             self.of_motion(N::CoulombFriction, |m, i| m.direction[i]);
         }
-        self.of_motion(N::AsymmetricFriction, |m, i| m.speed[i].abs());
+        if !rig.one_way {
+            self.of_motion(N::AsymmetricFriction, |m, i| m.speed[i].abs());
+        }
         self.of_motion(N::QuadraticDrag, |m, i| m.speed[i] * m.speed[i].abs());
         for part in [0.03, 0.06, 0.12, 0.25] {
             let speed = part * scale.fast;

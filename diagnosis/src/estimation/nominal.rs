@@ -63,6 +63,8 @@ pub(crate) struct Nominal {
     /// Rows by which the commands were delayed because they act after their time stamps; none if
     /// the recordings show no skew.
     pub(crate) skew_rows: Option<f64>,
+    /// True if the axis moves one way only: a constant force is a dry friction there.
+    pub(crate) one_way: bool,
 }
 
 /// The number of standard deviations by which a nominal value may move in a refit.
@@ -86,6 +88,9 @@ fn most_over_nominal(sd: f64) -> f64 {
     (2.0 * (1.0 + REACH * sd)).max(1.0 / least_of_truth(sd))
 }
 
+/// Part of a wandering bias that one may be where there is to be none.
+const NO_BIAS: f64 = 1e-3;
+
 /// Largest part of the command that may do nothing: where forces are in balance, where the inertia
 /// is hardly known, and where forces are not in balance.
 const IGNORED: f64 = 0.9;
@@ -103,6 +108,7 @@ impl Nominal {
             is_balanced: false,
             virtual_inertia: 0.0,
             skew_rows: None,
+            one_way: false,
         }
     }
 
@@ -199,6 +205,9 @@ impl Nominal {
                 let sd = if self.has_offset() {
                     let declared = rig.uncertainty.offset.unwrap_or(0.0) / j;
                     declared.max(wander).max(0.3 * self.force_scale() / j)
+                } else if self.one_way {
+                    // What a bias took would be missing from the dry friction.
+                    NO_BIAS * wander
                 } else {
                     wander
                 };

@@ -4,6 +4,7 @@
 use crate::io::recording::Recording;
 use crate::io::rig::{Kind, Rig};
 use crate::simulation::Motion;
+use numerics::digits::in_sentence;
 use numerics::linear::{Factor, Square};
 use numerics::spread::spread;
 use std::f64::consts::{PI, TAU};
@@ -26,7 +27,8 @@ fn broken(column: &[f64]) -> f64 {
 /// The sentence for a mistake in a recording, if there is one.
 pub(crate) fn mistake(recording: &Recording, rig: &Rig) -> Option<String> {
     swapped(recording)
-        .or_else(|| no_counts(recording))
+        .or_else(|| no_counts(recording, rig))
+        .or_else(|| mixed_axes(recording))
         .or_else(|| wrapped(recording, rig))
         .or_else(|| scale_or_sign(recording, rig))
 }
@@ -44,15 +46,48 @@ fn swapped(recording: &Recording) -> Option<String> {
     })
 }
 
-fn no_counts(recording: &Recording) -> Option<String> {
+fn no_counts(recording: &Recording, rig: &Rig) -> Option<String> {
     let counts = &recording.position_counts;
     let span = spread(counts);
-    (broken(counts) > BROKEN && span > 0.0 && span < FEW_COUNTS).then(|| {
+    let is_analogue = rig.encoder.noise_counts.is_some_and(|noise| noise > 0.0);
+    (!is_analogue && broken(counts) > BROKEN && span > 0.0 && span < FEW_COUNTS).then(|| {
         format!(
-            "position_counts of {} are not whole counts and span {span:.4}: they seem to be in radians, degrees or metres; multiply them by counts_per_unit, or let host-sim import do it with --column position=position_counts:deg",
-            recording.file
+            "position_counts of {} are not whole counts and span {span:.4}: they seem to be in radians, degrees or metres; multiply them by counts_per_unit, or let host-sim import do it with --column position=position_counts:deg; if they are of an analogue sensor, which scatters by about {} counts from row to row, set encoder.noise_counts to that",
+            recording.file,
+            in_sentence(scatter_of_rows(counts))
         )
     })
+}
+
+/// The standard deviation by which readings scatter from row to row: of their fourth differences,
+/// in which a smooth motion is next to nothing.
+fn scatter_of_rows(counts: &[f64]) -> f64 {
+    /// The squares of 1, 4, 6, 4 and 1, and the median of the size of a normal variable.
+    const SQUARES: f64 = 70.0;
+    const MEDIAN: f64 = 0.6745;
+    let mut sizes: Vec<f64> =
+        counts.windows(5).map(|w| (w[0] - 4.0 * w[1] + 6.0 * w[2] - 4.0 * w[3] + w[4]).abs()).collect();
+    sizes.sort_by(f64::total_cmp);
+    sizes.get(sizes.len() / 2).map_or(0.0, |median| median / MEDIAN / SQUARES.sqrt())
+}
+
+/// Most axes whose rows may follow one another in turn, and the factor between the travel from row
+/// to row and that from a row to the next of its own axis: an axis alone goes farther in more rows.
+const MOST_AXES: usize = 8;
+const OWN_ROW: f64 = 3.0;
+
+fn mixed_axes(recording: &Recording) -> Option<String> {
+    let counts = &recording.position_counts;
+    let mean = |rows: usize| {
+        let steps = counts.windows(rows + 1).map(|w| (w[rows] - w[0]).abs());
+        steps.sum::<f64>() / counts.len().saturating_sub(rows).max(1) as f64
+    };
+    let next = mean(1);
+    let axes = (2..=MOST_AXES).find(|rows| OWN_ROW * mean(*rows) < next)?;
+    Some(format!(
+        "position_counts of {} go to and fro with a period of {axes} rows, as where {axes} axes are in one column: let host-sim import read one of them with --rows 1/{axes}",
+        recording.file
+    ))
 }
 
 fn wrapped(recording: &Recording, rig: &Rig) -> Option<String> {
@@ -238,22 +273,18 @@ const UNITS_OF_ANGLE: [UnitOfAngle; 4] = [
     UnitOfAngle {
         radians: PI / 180.0,
         right: 2.2,
-        mistake: "counts_per_unit seems to be per degree; multiply it by 57.2958",
+        mistake: "counts_per_unit is per degree (multiply it by 57.2958)",
     },
     UnitOfAngle {
         radians: 180.0 / PI,
         right: 2.2,
-        mistake: "counts_per_unit seems to be 57.3 times too large, as where degrees were converted twice; divide it by 57.2958",
+        mistake: "counts_per_unit is 57.3 times too large, as where degrees were converted twice (divide it by 57.2958)",
     },
-    UnitOfAngle {
-        radians: TAU,
-        right: 1.4,
-        mistake: "counts_per_unit seems to be per turn; divide it by 6.28319",
-    },
+    UnitOfAngle { radians: TAU, right: 1.4, mistake: "counts_per_unit is per turn (divide it by 6.28319)" },
     UnitOfAngle {
         radians: 1.0 / TAU,
         right: 1.4,
-        mistake: "counts_per_unit seems to be 6.28 times too small, as where turns were converted twice; multiply it by 6.28319",
+        mistake: "counts_per_unit is 6.28 times too small, as where turns were converted twice (multiply it by 6.28319)",
     },
 ];
 
@@ -275,13 +306,20 @@ pub(crate) fn unit_of_angle(all: &[&Recording], rig: &Rig) -> Option<String> {
     if smoothed.iter().any(|one| ratio_in(one, 1.0).is_some_and(|ratio| ratio.ln().abs() < unlikely)) {
         return None;
     }
-    let asks_for_it = |unit: &UnitOfAngle| {
+    let asks_for_it = |unit: &&UnitOfAngle| {
         smoothed.iter().all(|one| {
             ratio_in(one, unit.radians).is_some_and(|ratio| (1.0 / unit.right..unit.right).contains(&ratio))
         })
     };
-    let unit = UNITS_OF_ANGLE.iter().find(|unit| asks_for_it(unit))?;
-    Some(format!("the motion of every recording asks for an inertia far from the rig's: {}", unit.mistake))
+    let fitting: Vec<&UnitOfAngle> = UNITS_OF_ANGLE.iter().filter(asks_for_it).collect();
+    let asked = ratio_in(smoothed.first()?, fitting.first()?.radians)? * fitting[0].radians;
+    let (factor, change) = if asked < 1.0 { (1.0 / asked, "multiply") } else { (asked, "divide") };
+    let units: Vec<&str> = fitting.iter().map(|unit| unit.mistake).collect();
+    Some(format!(
+        "the motion of every recording asks for an inertia {} times the rig's, and more than one mistake would explain that: {}; or command and angle are on two sides of a gear of about {factor:.0} ({change} actuator.gain by its ratio); or actuator.gain or model.inertia is wrong by that factor. Correct what is true of the machine",
+        in_sentence(asked),
+        units.join("; or ")
+    ))
 }
 
 /// Factor between the inertia for which one recording asks and that of the others from which they

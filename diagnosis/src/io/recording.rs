@@ -204,18 +204,52 @@ impl Recording {
         if first == 0 && end == n {
             return (Cow::Borrowed(self), 0.0);
         }
-        let cut = |column: &Vec<f64>| column[first..end].to_vec();
-        let cut_if = |column: &Option<Vec<f64>>| column.as_ref().map(cut);
-        let part = Self {
-            file: self.file.clone(),
-            time_s: cut(&self.time_s),
-            command: cut(&self.command),
-            position_counts: cut(&self.position_counts),
-            tilt_rad: cut_if(&self.tilt_rad),
-            reference_counts: cut_if(&self.reference_counts),
-            force: cut_if(&self.force),
-        };
+        let part = self.mapped(|column| column[first..end].to_vec());
         (Cow::Owned(part), t[first] - t[0])
+    }
+
+    /// The recording with each of its columns changed in the same way.
+    fn mapped(&self, change: impl Fn(&Vec<f64>) -> Vec<f64>) -> Self {
+        Self {
+            file: self.file.clone(),
+            time_s: change(&self.time_s),
+            command: change(&self.command),
+            position_counts: change(&self.position_counts),
+            tilt_rad: self.tilt_rad.as_ref().map(&change),
+            reference_counts: self.reference_counts.as_ref().map(&change),
+            force: self.force.as_ref().map(&change),
+        }
+    }
+
+    /// The recording at some of its rows, in order, each with the mean command until the next.
+    pub(crate) fn at_rows(&self, rows: &[usize]) -> Self {
+        let mut out = self.mapped(|column| rows.iter().map(|row| column[*row]).collect());
+        let t = &self.time_s;
+        for (place, from) in rows.iter().enumerate() {
+            let to = rows.get(place + 1).copied().unwrap_or(self.len() - 1);
+            let acted: f64 = (*from..to).map(|row| self.command[row] * (t[row + 1] - t[row])).sum();
+            if to > *from {
+                out.command[place] = acted / (t[to] - t[*from]);
+            }
+        }
+        out
+    }
+
+    /// At most so many rows of the recording, from its middle.
+    pub(crate) fn middle(&self, most: usize) -> Cow<'_, Self> {
+        let first = self.len().saturating_sub(most) / 2;
+        match self.len() > most {
+            true => Cow::Owned(self.mapped(|column| column[first..first + most].to_vec())),
+            false => Cow::Borrowed(self),
+        }
+    }
+
+    /// The recording with the commands that were logged so many rows later, which the last rows
+    /// lack.
+    pub(crate) fn with_earlier_command(&self, rows: usize) -> Self {
+        let n = self.len().saturating_sub(rows);
+        let command = self.command[self.len() - n..].to_vec();
+        Self { command, ..self.mapped(|column| column[..n].to_vec()) }
     }
 
     /// Number of rows.

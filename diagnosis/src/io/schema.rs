@@ -226,6 +226,33 @@ pub struct FreeForm {
     pub share_of_ceiling: f64,
 }
 
+/// The kind of a fault of a recording.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum FaultKind {
+    /// The position is logged more often than it is read; the value is its new readings a second.
+    HeldReadings,
+    /// The command is logged more often than it is renewed; the value is its new values a second.
+    SlowCommand,
+    /// The command is logged after the motion that it makes; the value is the time between them.
+    LateCommand,
+    /// The axis moves one way only; the value is the part of its travel that goes the other way.
+    OneWayMotion,
+}
+
+/// A fault of a recording, found before any law was searched.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct DataFault {
+    /// Its kind.
+    pub kind: FaultKind,
+    /// Its size, in `unit`.
+    pub value: f64,
+    /// `Hz`, `s` or `1`.
+    pub unit: String,
+    /// The recording's file name.
+    pub file: String,
+}
+
 /// The report.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Report {
@@ -251,6 +278,10 @@ pub struct Report {
     /// no skew.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub command_late_rows: Option<f64>,
+    /// Faults of the recordings; each is taken out of what was diagnosed, or is the reason why
+    /// nothing was.
+    #[serde(skip_serializing_if = "Vec::is_empty", default)]
+    pub data_faults: Vec<DataFault>,
     /// Clauses that say what the refit did that a reader has to know.
     #[serde(skip_serializing_if = "Vec::is_empty", default)]
     pub notes: Vec<String>,

@@ -12,7 +12,7 @@ const FEWEST_ROWS: usize = 150;
 const LEAST_S: f64 = 0.25;
 const LEAST_ROWS: usize = 40;
 /// Slowest and fastest rate that is worth fitting, Hz.
-const SLOWEST_HZ: f64 = 19.0;
+pub(crate) const SLOWEST_HZ: f64 = 19.0;
 const FASTEST_HZ: f64 = 25_000.0;
 /// Nobody records a motion more slowly: the unit of the time is another.
 const NOBODYS_HZ: f64 = 2.0;

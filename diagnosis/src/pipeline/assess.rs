@@ -57,7 +57,7 @@ pub(crate) fn assess(prepared: &Prepared, found: Found) -> Result<Assessment, Re
     let scales =
         Scales { context: &context, refit: &refit, null: &null, holdout: &holdout, excitation: &excitation };
     let weighed = weigh(&scales, standing);
-    if let Some(reason) = misfit(&weighed, nominal).filter(|_| is_driven(nominal, &fit)) {
+    if let Some(reason) = misfit(&weighed, nominal, is_driven(nominal, &fit)) {
         return Err(reason);
     }
     let (mut weighed, beside) = free_form_check::check(weighed, &context);

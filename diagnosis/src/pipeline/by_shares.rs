@@ -108,7 +108,8 @@ fn may_confirm(effect: &Effect, selected: &Selected) -> bool {
 pub(super) fn shown(prepared: &Prepared, found: &Found) -> Shown {
     let (count, rig) = (prepared.span.count, &prepared.nominal.rig);
     let excitation = Excitation::of(&found.fit, count, rig.turn()).shown();
-    Shown { linear: rig.kind == Kind::Linear, count, ..excitation }
+    let one_way = prepared.span.one_way;
+    Shown { one_way, linear: rig.kind == Kind::Linear, count, ..excitation }
 }
 
 /// True if shares name something new and leave clearly less of the force than what was found, so

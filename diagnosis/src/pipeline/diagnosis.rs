@@ -36,6 +36,10 @@ pub(crate) enum Reason {
     Recordings(String),
     /// The rig's model does not describe these recordings at all; it leaves this part of the force.
     Misfit { left: f64 },
+    /// No row of the fitted or of the held-out recordings shows a force, although the axis moves.
+    NoForce,
+    /// The sensor's noise hides the rest: this part of the held-out force remains.
+    MostRemains { left: f64 },
     /// All motion is at about one speed, within this factor.
     OneSpeed { factor: f64 },
     /// A force that swings at a frequency of its own is this part of what a refit leaves.

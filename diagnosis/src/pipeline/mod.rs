@@ -20,6 +20,7 @@ mod run_forward;
 mod search;
 mod verdict;
 
+use crate::data_faults::Checked;
 use crate::estimation::{plausibility, skew};
 use crate::io::error::InputError;
 use crate::io::recording::Recording;
@@ -38,24 +39,20 @@ use search::Found;
 pub(crate) type Progress<'a> = &'a (dyn Fn(&str, f64) + Sync);
 
 /// Diagnoses recordings of a rig; an error where one of them cannot be used at all.
-pub(crate) fn run(
-    rig: &Rig,
-    fit: &[Recording],
-    holdout: &[Recording],
-    progress: Progress,
-) -> Result<Diagnosis, InputError> {
+pub(crate) fn run(rig: &Rig, checked: &Checked, progress: Progress) -> Result<Diagnosis, InputError> {
+    let (fit, holdout) = (&*checked.fit, &*checked.holdout);
     let all: Vec<&Recording> = fit.iter().chain(holdout).collect();
     if let Some(sentence) = unusable(&all, rig) {
         return Err(InputError::new(sentence));
     }
-    if let Some(sentence) = sufficiency::too_little(fit, holdout) {
+    if let Some(sentence) = checked.too_slow.clone().or_else(|| sufficiency::too_little(fit, holdout)) {
         let reason = Reason::Recordings(sentence);
         return Ok(Diagnosis::CannotTell { rig: Box::new(rig.clone()), reason, rate_hz: None });
     }
-    let mut prepared = prepare::prepare(rig, fit, holdout, None, progress);
+    let mut prepared = prepare::prepare(rig, checked, None, progress);
     let mut found = search::search(&prepared, Vec::new(), progress);
     if let Some(rows) = hidden_skew(&prepared, &found) {
-        prepared = prepare::prepare(rig, fit, holdout, Some(rows), progress);
+        prepared = prepare::prepare(rig, checked, Some(rows), progress);
         found = search::search(&prepared, Vec::new(), progress);
     }
     let found = without_wrong_sizes(&prepared, found, progress);
@@ -142,13 +139,14 @@ fn unusable(all: &[&Recording], rig: &Rig) -> Option<String> {
             None => usable.push(recording.file.as_str()),
         }
     }
+    // A mistake that every recording shows leaves none to be used.
+    if let Some(sentence) = plausibility::unit_of_angle(all, rig).filter(|_| first.is_none()) {
+        return Some(sentence);
+    }
     let odd = || {
         let (place, sentence) = plausibility::odd_one(all, rig)?;
         usable.remove(place);
         Some(sentence)
     };
-    first
-        .or_else(|| plausibility::unit_of_angle(all, rig))
-        .or_else(odd)
-        .map(|sentence| sufficiency::with_usable(sentence, &usable))
+    first.or_else(odd).map(|sentence| sufficiency::with_usable(sentence, &usable))
 }

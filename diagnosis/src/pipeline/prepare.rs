@@ -2,6 +2,7 @@
 //! before any effect is looked for.
 
 use super::Progress;
+use crate::data_faults::Checked;
 use crate::effects::definition::Span;
 use crate::effects::{Effect, EffectName};
 use crate::estimation::blocked_recording::{BlockedRecording, Jumps};
@@ -48,16 +49,11 @@ impl Prepared {
 
 /// Cuts recordings into blocks, refits the nominal model, and looks for lost counts; `skew_rows`
 /// are the rows by which commands act late, where that is known.
-pub(crate) fn prepare(
-    rig: &Rig,
-    fit: &[Recording],
-    holdout: &[Recording],
-    skew_rows: Option<f64>,
-    progress: Progress,
-) -> Prepared {
+pub(crate) fn prepare(rig: &Rig, checked: &Checked, skew_rows: Option<f64>, progress: Progress) -> Prepared {
+    let (fit, holdout) = (&*checked.fit, &*checked.holdout);
     let cut = |all: &[Recording]| all.iter().map(|r| BlockedRecording::moving(r, rig)).collect::<Vec<_>>();
     let (mut tracks, mut judging) = (cut(fit), cut(holdout));
-    let mut nominal = Nominal::of(rig);
+    let mut nominal = Nominal { one_way: checked.is_one_way, ..Nominal::of(rig) };
     quasi_static::add_inertia(&mut nominal, &mut tracks, &mut judging);
     progress("refitting the nominal model", 0.1);
     let (mut noise, mut refit) = refit::settle(&mut nominal, &mut tracks);
@@ -68,7 +64,7 @@ pub(crate) fn prepare(
         let scale = refit::acceleration_scale(&nominal, &tracks);
         skew::settle(&mut nominal, &mut tracks, &noise, scale);
     }
-    let plain = PlainSelection::new(rig, nominal.skew_rows.unwrap_or(0.0), [fit, holdout]);
+    let plain = PlainSelection::new(rig, nominal.skew_rows.unwrap_or(0.0), nominal.one_way, [fit, holdout]);
     if let Some(rows) = nominal.skew_rows {
         skew::delay_commands(&mut judging, rows);
         (noise, refit) = refit::settle(&mut nominal, &mut tracks);

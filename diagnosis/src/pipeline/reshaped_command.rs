@@ -67,6 +67,7 @@ fn wrong_sizes(prepared: &Prepared, found: &Found) -> Vec<RejectedHypothesis> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::data_faults::Checked;
     use crate::effects::EffectName as N;
     use crate::io::recording::Recording;
     use crate::io::rig::Rig;
@@ -98,8 +99,12 @@ mod tests {
     fn sizes(half_width: f64, written: impl Fn(f64) -> f64 + Copy) -> (f64, f64) {
         let mut rig = Rig::of_values(INERTIA, 0.0, 0.0);
         (rig.encoder.counts_per_unit, rig.actuator.gain) = (2e5, 1.0);
-        let prepared =
-            prepare(&rig, &[recording(0.0, written)], &[recording(1.0, written)], None, &|_, _| {});
+        let prepared = prepare(
+            &rig,
+            &Checked::unchanged(&[recording(0.0, written)], &[recording(1.0, written)]),
+            None,
+            &|_, _| {},
+        );
         let context = prepared.context(&prepared.fit);
         let selection =
             Selection::new(&context, prepared.noise, &prepared.holdout.smoothed).expect("it moves");

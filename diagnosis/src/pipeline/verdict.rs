@@ -23,9 +23,13 @@ const DISTURBED: f64 = 0.05;
 const REPEATS: f64 = 0.7;
 
 /// Returns why the rig's model does not describe these recordings at all; none if it does.
-pub(crate) fn misfit(weighed: &WeighedModel, nominal: &Nominal) -> Option<Reason> {
+/// `is_driven` says whether the command drives the motion.
+pub(crate) fn misfit(weighed: &WeighedModel, nominal: &Nominal, is_driven: bool) -> Option<Reason> {
     let table = &weighed.shown.table;
     let force = table.force_rms;
+    if !(force.fit > 0.0 && force.holdout > 0.0) {
+        return Some(Reason::NoForce);
+    }
     // Where the inertia is hardly known the refit alone says little; elsewhere it must explain
     // something, unless what was found explains nearly all. A command that is another one explains
     // anything; a plain force that was left out explains what it should.
@@ -35,7 +39,7 @@ pub(crate) fn misfit(weighed: &WeighedModel, nominal: &Nominal) -> Option<Reason
     let fits_not = judged.holdout > FOREIGN * force.holdout
         && judged.fit > FOREIGN * force.fit
         && (is_another || table.patched.holdout > UNDERSTOOD.0 * force.holdout);
-    fits_not.then(|| Reason::Misfit { left: judged.holdout / force.holdout.max(1e-300) })
+    (fits_not && is_driven).then(|| Reason::Misfit { left: judged.holdout / force.holdout.max(1e-300) })
 }
 
 /// The verdict, and the residual where no effect is named; `maps` are of the residual of the whole
@@ -86,6 +90,9 @@ pub(crate) fn verdict(
             Some(reason) => (Verdict::Unexplained, Some(reason)),
             None => (Verdict::RandomDisturbance, None),
         }
+    } else if table.patched.holdout > UNDERSTOOD.1 * table.force_rms.holdout {
+        let left = table.patched.holdout / table.force_rms.holdout;
+        (Verdict::InsufficientExcitation, Some(Reason::MostRemains { left }))
     } else if refit_matters(&weighed.estimator, holdout, on_holdout, table.force_rms.holdout) {
         (Verdict::ParametersOnly, None)
     } else {

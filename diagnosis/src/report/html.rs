@@ -4,6 +4,7 @@
 use crate::io::recording::shown_at;
 use crate::io::rig::Kind;
 use crate::io::schema::{Hypothesis, Named, Verdict};
+use crate::report::faults;
 use crate::report::free_form;
 use crate::report::motion_picture;
 use crate::report::outcome::{Outcome, unit};
@@ -25,7 +26,7 @@ pub(crate) fn page(outcome: &Outcome) -> String {
         safe(&r.sentence),
         safe(&r.remains),
         safe(&r.record_next),
-        r.notes.iter().map(|note| format!("<dt>Note</dt><dd>{}.</dd>", safe(note))).collect::<String>()
+        short_notes(outcome)
     );
     motion(&mut out, outcome);
     if r.verdict != Verdict::InsufficientExcitation {
@@ -42,6 +43,14 @@ pub(crate) fn page(outcome: &Outcome) -> String {
     next(&mut out, outcome);
     footer(&mut out, outcome);
     simulation_page::whole(&format!("Diagnosis: {}", outcome.evidence.rig), &out)
+}
+
+/// Faults of the recordings, and notes.
+fn short_notes(outcome: &Outcome) -> String {
+    let faults =
+        faults::clauses(&outcome.report.data_faults).into_iter().map(|text| ("Fault of the data", text));
+    let notes = outcome.report.notes.iter().map(|text| ("Note", text.clone()));
+    faults.chain(notes).map(|(what, text)| format!("<dt>{what}</dt><dd>{}.</dd>", safe(&text))).collect()
 }
 
 /// The motion that the simulation gives, next to the one that was recorded.

@@ -1,6 +1,7 @@
 //! Sentences, pages and files of a finished diagnosis. Nothing here fits.
 
 pub mod exports;
+mod faults;
 mod form_in_words;
 pub(crate) mod free_form;
 mod html;
@@ -18,6 +19,6 @@ pub(crate) mod text;
 mod write;
 
 pub use crate::io::schema::{
-    Both, ByModel, Contending, FitTable, FreeForm, Hypothesis, Named, Parameter, Place, Region, Report,
-    Simulation, Stretch, Untested, Verdict, WindowsOff,
+    Both, ByModel, Contending, DataFault, FaultKind, FitTable, FreeForm, Hypothesis, Named, Parameter, Place,
+    Region, Report, Simulation, Stretch, Untested, Verdict, WindowsOff,
 };

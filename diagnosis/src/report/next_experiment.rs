@@ -30,6 +30,9 @@ pub(crate) fn strokes(beyond: BeyondFitted, length: &str) -> String {
     )
 }
 
+/// A recording in which noise hides less.
+pub(crate) const LOUDER: &str = "the same with larger and faster changes of the command, or with a finer sensor: noise hides most of the force here";
+
 /// A recording that makes a diagnosis possible.
 pub(crate) const GENERAL: &str = "ten seconds or more at 500 Hz or more with reversals, several speeds both ways and a \
     command that is not constant, for example a slow triangle with a multisine on top";

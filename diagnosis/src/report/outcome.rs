@@ -202,6 +202,7 @@ impl Outcome {
             },
             refitted: BTreeMap::new(),
             command_late_rows: None,
+            data_faults: Vec::new(),
             notes: Vec::new(),
             residual_bandwidth_hz: 0.0,
             noise_floor: 0.0,
@@ -244,7 +245,7 @@ impl Outcome {
         let form = diagnosis.free_form.as_ref().and_then(|force| force.shape.as_ref());
         let form = form.map(|shape| free_form::sentence(shape, kind.length()));
         let separating_experiment = match diagnosis.verdict {
-            Verdict::InsufficientExcitation => Some(next_experiment::SPEEDS.to_owned()),
+            Verdict::InsufficientExcitation => Some(enough(diagnosis.reason.as_ref()).to_owned()),
             _ => diagnosis.beyond_fitted.map(|beyond| next_experiment::strokes(beyond, kind.length())),
         };
         let mut report = Report {
@@ -257,6 +258,7 @@ impl Outcome {
             fit: diagnosis.errors,
             refitted: refitted(&patched),
             command_late_rows: diagnosis.moved.late_rows,
+            data_faults: Vec::new(),
             notes: notes::notes(&diagnosis.moved),
             residual_bandwidth_hz: diagnosis.bandwidth_hz,
             noise_floor: diagnosis.noise_floor,
@@ -287,6 +289,14 @@ impl Outcome {
         };
         let [nominal_rig, refit_rig, patched_rig] = [nominal, refit, patched];
         Self { report, evidence, nominal_rig, refit_rig, patched_rig, contending_rigs, made: None }
+    }
+}
+
+/// A recording that would excite enough, where recordings did not for a reason.
+fn enough(reason: Option<&Reason>) -> &'static str {
+    match reason {
+        Some(Reason::MostRemains { .. }) => next_experiment::LOUDER,
+        _ => next_experiment::SPEEDS,
     }
 }
 

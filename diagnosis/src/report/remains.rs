@@ -2,6 +2,7 @@
 //! to record next.
 
 use crate::io::schema::{Report, Verdict};
+use crate::thresholds::UNDERSTOOD;
 
 /// The residual over the sensor's noise from which there is more to be found, and below which there
 /// is nothing.
@@ -41,6 +42,7 @@ fn remains(report: &Report) -> String {
     let means = match report.verdict {
         // The report shows the form of what repeats, however small it is.
         Verdict::Unexplained => "",
+        _ if ratio < MORE && is_most(report) => ": noise hides most of the force",
         _ if ratio < NOTHING => ": nothing more can be learnt from these recordings",
         _ if ratio < MORE => ": there is little more to be found in them",
         Verdict::MissingPhysics => {
@@ -52,6 +54,11 @@ fn remains(report: &Report) -> String {
     format!("{percent:.1} % of the force on held-out recordings, {} the sensor's noise{means}", times(ratio))
 }
 
+/// True if more of the held-out force remains than a model leaves that has understood it.
+fn is_most(report: &Report) -> bool {
+    report.fit.patched.holdout > UNDERSTOOD.1 * report.fit.force_rms.holdout
+}
+
 fn record_next(report: &Report) -> String {
     let experiments = report.effects.iter().filter_map(|e| e.separating_experiment.as_ref());
     if let Some(experiment) = experiments.chain(&report.separating_experiment).next() {
@@ -59,6 +66,7 @@ fn record_next(report: &Report) -> String {
     }
     match report.verdict {
         Verdict::MissingPhysics if of_noise(report).is_some_and(|ratio| ratio >= MORE) => FURTHER,
+        Verdict::MissingPhysics if is_most(report) => super::next_experiment::LOUDER,
         Verdict::MissingPhysics => {
             "nothing more is needed; to confirm, record again on another day, at other speeds and loads"
         }
@@ -106,6 +114,15 @@ mod tests {
         let repeats = report(Verdict::Unexplained, 0.05 / 1.1).remains;
         assert!(repeats.ends_with("1.1 times the sensor's noise"), "{repeats}: the form is in the report");
         assert!(!said(0.0).contains("noise"), "a sensor without noise is no yardstick");
+    }
+
+    #[test]
+    fn nothing_is_not_said_while_most_of_the_force_remains() {
+        let mut report = report(Verdict::MissingPhysics, 0.58);
+        report.fit.patched.holdout = 0.6;
+        complete(&mut report);
+        assert!(report.remains.ends_with("noise hides most of the force"), "{}", report.remains);
+        assert!(!report.record_next.starts_with("nothing"), "{}", report.record_next);
     }
 
     #[test]

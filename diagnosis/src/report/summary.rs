@@ -3,6 +3,7 @@
 use crate::effects::EffectName;
 use crate::io::recording::shown_at;
 use crate::io::schema::ByModel;
+use crate::report::faults;
 use crate::report::outcome::Outcome;
 use numerics::digits::short;
 use std::fmt::Write as _;
@@ -13,6 +14,9 @@ impl Outcome {
         let r = &self.report;
         let mut out =
             format!("{}.\n  what remains: {}\n  record next: {}\n", r.sentence, r.remains, r.record_next);
+        for fault in faults::clauses(&r.data_faults) {
+            out.push_str(&format!("  fault of the data: {fault}\n"));
+        }
         for note in &r.notes {
             out.push_str(&format!("  note: {note}\n"));
         }

@@ -165,6 +165,14 @@ pub(crate) fn reason(why: &Reason, form: Option<&str>) -> String {
             "the rig's model with refitted values leaves {:.0} % of the force unexplained, as it does where a unit is wrong (seconds, counts, command) or where something that was not recorded moves the axis",
             100.0 * left
         ),
+        Reason::NoForce => {
+            "every row counts as rest although the axis moves, so that no force is seen: check that the position is read at every row, and its unit"
+                .into()
+        }
+        Reason::MostRemains { left } => format!(
+            "{:.0} % of the force on held-out recordings remains, which the sensor's noise hides",
+            100.0 * left
+        ),
         Reason::OneSpeed { factor } => format!(
             "all motion is at about one speed (nine tenths of it within a factor of {factor:.1}), so effects that depend on speed look like those that do not"
         ),

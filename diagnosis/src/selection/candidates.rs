@@ -63,6 +63,7 @@ pub(crate) fn span_of(tracks: &[BlockedRecording], nominal: &Nominal) -> Span {
         count: 1.0 / nominal.rig.encoder.counts_per_unit,
         clip: least_clip(tracks, nominal.anchor.is_some(), command, machine.dry / machine.per_command.abs()),
         dead: nominal.most_ignored() * command,
+        one_way: nominal.one_way,
         tilt: varies(tracks.iter().flat_map(|t| column(&t.blocks.tilt))),
         force: varies(tracks.iter().flat_map(|t| column(&t.blocks.force))),
         rig: Believed {
@@ -275,6 +276,7 @@ mod tests {
             count: 1e-3,
             clip: 0.27,
             dead: 0.8,
+            one_way: false,
             tilt: false,
             force: false,
             rig: Believed::default(),

@@ -159,6 +159,7 @@ pub(crate) fn class(
     let mut class = vec![name];
     let shown = Shown {
         leaves_much,
+        one_way: context.span.one_way,
         linear: context.nominal.rig.kind == Kind::Linear,
         count: context.span.count,
         ..excitation.shown()

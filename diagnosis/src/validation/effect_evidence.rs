@@ -119,7 +119,7 @@ impl<'a> JudgedModel<'a> {
             holdout: holdout_likelihood::compare(&self.on_holdout, &evaluated),
             fit: bootstrap(&gains),
             force: relative_gain(estimator, shown, &less.held_out, &left.held_out),
-            share: self.share(&less),
+            share: self.share(&effect, &less),
             off_force: self.off_force(&less),
             at_bound: self.is_at_bound(&effect, i),
             is_comb: comb::is_comb(&effect, &last.fit.amplitudes(i)),
@@ -134,12 +134,18 @@ impl<'a> JudgedModel<'a> {
     }
 
     /// Part of what the noise leaves that the model explains and one that leaves `less` does not.
-    /// What one recording hardly shows another may be made for.
-    fn share(&self, less: &LeftForce) -> f64 {
+    /// What one recording hardly shows another may be made for. Where the axis moves one way, any
+    /// other friction stands for most of a dry one, which then counts as a part of the force that
+    /// it would leave.
+    fn share(&self, effect: &Effect, less: &LeftForce) -> f64 {
         let square =
             |left: &[Vec<f64>], tracks: &[BlockedRecording]| self.estimator.rms(left, tracks).powi(2);
-        let [fitted, held_out] = self.explainable;
         let (tracks, shown) = (self.context.tracks, self.shown);
+        let is_hidden = self.context.span.one_way && effect.name.definition().is_dry();
+        let [fitted, held_out] = match is_hidden {
+            true => [square(&less.fitted, tracks), square(&less.held_out, shown)].map(|x| x.max(1e-300)),
+            false => self.explainable,
+        };
         ((square(&less.held_out, shown) - square(&self.left.held_out, shown)) / held_out)
             .max((square(&less.fitted, tracks) - square(&self.left.fitted, tracks)) / fitted)
     }

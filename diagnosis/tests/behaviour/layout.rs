@@ -6,8 +6,17 @@ use std::path::{Path, PathBuf};
 
 /// Folders from the bottom to the top. Folders are counted, not files as in the small crates of
 /// host-sim: an arrow within a folder stays within its subject.
-const FLOORS: [&str; 8] =
-    ["effects", "io", "simulation", "estimation", "selection", "validation", "pipeline", "report"];
+const FLOORS: [&str; 9] = [
+    "effects",
+    "io",
+    "simulation",
+    "data_faults",
+    "estimation",
+    "selection",
+    "validation",
+    "pipeline",
+    "report",
+];
 
 fn sources(dir: &Path, out: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(dir).expect("the folder is there") {

@@ -1,5 +1,5 @@
-//! Progress of long work: one line on a terminal, nothing in a pipe; with `--verbose` a line for
-//! each stage.
+//! Progress of long work: one line on a terminal, a line now and then in a pipe; with `--verbose` a
+//! line for each stage.
 
 use std::io::{IsTerminal, Write};
 use std::time::{Duration, Instant};
@@ -10,25 +10,33 @@ const INTERVAL: Duration = Duration::from_millis(100);
 /// With `--verbose`, a stage that goes on is printed again after this.
 const AGAIN: Duration = Duration::from_secs(5);
 
+/// In a pipe, work that takes long is told after this, and again after this.
+const IN_A_PIPE: Duration = Duration::from_secs(15);
+
 /// A line that is drawn over.
 pub struct Progress {
     what: &'static str,
-    on: bool,
+    quiet: bool,
+    is_terminal: bool,
     verbose: bool,
     /// The unit or stage of the last line.
     stage: String,
+    /// The last `done` and `all` that were shown.
+    shown: Option<(f64, Option<f64>)>,
     drawn: Option<Instant>,
     begun: Instant,
 }
 
 impl Progress {
-    /// Quiet unless standard error is a terminal, and with `--quiet`.
+    /// Says nothing with `--quiet`, and little unless standard error is a terminal.
     pub fn new(what: &'static str) -> Self {
         Self {
             what,
-            on: std::io::stderr().is_terminal() && !crate::output::is_quiet(),
+            quiet: crate::output::is_quiet(),
+            is_terminal: std::io::stderr().is_terminal(),
             verbose: crate::output::is_verbose(),
             stage: String::new(),
+            shown: None,
             drawn: None,
             begun: Instant::now(),
         }
@@ -37,12 +45,18 @@ impl Progress {
     /// Shows `done` of `all`, where that is known.
     pub fn show(&mut self, done: f64, all: Option<f64>, unit: &str) {
         let is_due = |interval| self.drawn.is_none_or(|drawn| drawn.elapsed() >= interval);
-        let is_wanted =
-            if self.verbose { self.stage != unit || is_due(AGAIN) } else { self.on && is_due(INTERVAL) };
+        let is_wanted = match (self.verbose, self.is_terminal) {
+            (true, _) => self.stage != unit || is_due(AGAIN),
+            (false, true) => !self.quiet && is_due(INTERVAL),
+            (false, false) => !self.quiet && self.begun.elapsed() >= IN_A_PIPE && is_due(IN_A_PIPE),
+        };
+        if self.stage != unit {
+            unit.clone_into(&mut self.stage);
+        }
+        self.shown = Some((done, all));
         if !is_wanted {
             return;
         }
-        unit.clone_into(&mut self.stage);
         self.drawn = Some(Instant::now());
         let line = match all {
             Some(all) => {
@@ -53,10 +67,18 @@ impl Progress {
             None => format!("{}: {done:.1} {unit}", self.what),
         };
         // A terminal that went away is no reason to stop.
-        let _ = match self.verbose {
+        let _ = match self.verbose || !self.is_terminal {
             true => writeln!(std::io::stderr(), "{:8.1} s  {line}", self.begun.elapsed().as_secs_f64()),
             false => write!(std::io::stderr(), "\r\x1b[K{line}"),
         };
+    }
+
+    /// Shows again what was shown last, where that is due: a stage may take minutes.
+    pub fn show_again(&mut self) {
+        if let Some((done, all)) = self.shown {
+            let stage = self.stage.clone();
+            self.show(done, all, &stage);
+        }
     }
 }
 
@@ -72,7 +94,7 @@ fn left(elapsed: f64, part: f64) -> Option<String> {
 
 impl Drop for Progress {
     fn drop(&mut self) {
-        if self.drawn.is_some() && !self.verbose {
+        if self.drawn.is_some() && !self.verbose && self.is_terminal {
             let _ = write!(std::io::stderr(), "\r\x1b[K");
         }
     }

@@ -9,6 +9,8 @@ use sha2::{Digest, Sha256};
 use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::sync::Mutex;
+use std::sync::mpsc::{self, RecvTimeoutError};
+use std::time::Duration;
 
 /// Find where a simulation and its recordings differ and which physics is missing, and prove it on
 /// held-out recordings.
@@ -50,7 +52,8 @@ impl Diagnose {
                 bar.show(100.0 * done, Some(100.0), &format!("% ({stage})"));
             }
         };
-        let mut outcome = diagnosis::diagnose(&request, &show).map_err(Error::input)?;
+        let mut outcome =
+            while_showing(&bar, || diagnosis::diagnose(&request, &show)).map_err(Error::input)?;
         drop(bar);
         outcome.made = Some(made(&request));
         outcome.write(&self.out).map_err(|cause| {
@@ -64,6 +67,23 @@ impl Diagnose {
         say!("report: {}", self.out.join("report.html").display());
         Ok(())
     }
+}
+
+/// Does some work and meanwhile shows now and then how far it is.
+fn while_showing<T>(bar: &Mutex<Progress>, work: impl FnOnce() -> T) -> T {
+    let (done, is_done) = mpsc::channel::<()>();
+    std::thread::scope(|scope| {
+        scope.spawn(move || {
+            while let Err(RecvTimeoutError::Timeout) = is_done.recv_timeout(Duration::from_secs(1)) {
+                if let Ok(mut bar) = bar.lock() {
+                    bar.show_again();
+                }
+            }
+        });
+        let result = work();
+        drop(done);
+        result
+    })
 }
 
 /// Describes the report's sources.

@@ -31,6 +31,7 @@ mod serial;
 mod settle;
 mod simulate;
 mod strangers;
+mod strangers_faults;
 mod strangers_kept;
 mod streams;
 mod training;

@@ -33,6 +33,8 @@ pub(crate) struct Span {
     pub(crate) clip: f64,
     /// Largest command that may do nothing.
     pub(crate) dead: f64,
+    /// True if the axis moves one way only.
+    pub(crate) one_way: bool,
     /// True if the columns are there and vary.
     pub(crate) tilt: bool,
     pub(crate) force: bool,
@@ -92,9 +94,10 @@ pub(crate) const POSITIVE: (f64, f64) = (0.0, f64::INFINITY);
 /// Limits of the recordings that decide whether twins can be distinguished.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Shown {
-    /// True if all motion is at one speed, in strokes of one length, within less than a turn, and
-    /// along a line.
+    /// True if all motion is at one speed, one way, in strokes of one length, within less than a
+    /// turn, and along a line.
     pub(crate) one_speed: bool,
+    pub(crate) one_way: bool,
     pub(crate) one_length: bool,
     pub(crate) less_than_a_turn: bool,
     pub(crate) linear: bool,

@@ -1,4 +1,5 @@
 use super::*;
+use crate::data_faults::Checked;
 use crate::effects::EffectName as N;
 use crate::io::recording::Recording;
 use crate::io::rig::Rig;
@@ -43,7 +44,8 @@ fn turned_slowly(machine: &Rig, speed: f64) -> Recording {
 /// tries.
 fn decided(machine: &Rig) -> Vec<(N, usize)> {
     let (model, take) = (rig(""), |speed| turned_slowly(machine, speed));
-    let prepared = prepare(&model, &[take(1.0), take(1.2)], &[take(0.8)], Some(0.0), &|_, _| ());
+    let prepared =
+        prepare(&model, &Checked::unchanged(&[take(1.0), take(1.2)], &[take(0.8)]), Some(0.0), &|_, _| ());
     let search = Search { prepared: &prepared, progress: &|_, _| (), done: Cell::new(0.0) };
     let now = search.start();
     let on = search.context(&now.tracks);

@@ -1,9 +1,9 @@
 //! A recording's equation of motion in one band, by differentiation of the readings.
 
-use super::even_grid::{cells, cubic, directions, first, low_pass, second};
 use crate::effects::plain_laws::PlainMotion;
 use crate::io::recording::Recording;
 use crate::io::rig::Rig;
+use numerics::even_grid::{cells, cubic, directions, first, low_pass, second};
 
 /// Part of the sampling rate below which the regression looks, and the least of it, Hz.
 const BAND_PART: f64 = 0.03;

@@ -9,7 +9,6 @@
 //! (docs/measured/diagnosis.md).
 
 mod axis;
-mod even_grid;
 mod regression;
 
 use crate::effects::EffectName;
@@ -44,14 +43,15 @@ pub(crate) struct PlainSelection {
 
 impl PlainSelection {
     /// Selects laws; nothing where the rig has effects of its own, of which it knows nothing, or a
-    /// recording has too few rows that move. Commands act `late_rows` rows after their time stamps.
-    pub(crate) fn new(rig: &Rig, late_rows: f64, [fit, holdout]: [&[Recording]; 2]) -> Self {
+    /// recording has too few rows that move. Commands act `late_rows` rows after their time stamps;
+    /// `one_way` says whether the axis moves one way only.
+    pub(crate) fn new(rig: &Rig, late_rows: f64, one_way: bool, [fit, holdout]: [&[Recording]; 2]) -> Self {
         let all: Vec<&Recording> = fit.iter().chain(holdout).collect();
         let axes: Option<Vec<Axis>> =
             parallel::map_all(&all, |one| Axis::new(one, rig, late_rows)).into_iter().collect();
         let enough = |axes: &Vec<Axis>| axes.iter().all(|axis| axis.rows() >= FEWEST_ROWS);
         match axes.filter(enough) {
-            Some(axes) if rig.effects.is_empty() => Selecting { axes, fits: fit.len() }.select(rig),
+            Some(axes) if rig.effects.is_empty() => Selecting { axes, fits: fit.len(), one_way }.select(rig),
             _ => Self::default(),
         }
     }
@@ -73,7 +73,7 @@ impl PlainSelection {
     }
 }
 
-fn facts(rig: &Rig) -> PlainRig {
+fn facts(rig: &Rig, one_way: bool) -> PlainRig {
     PlainRig {
         has_viscous: rig.model.viscous.is_some(),
         has_coulomb: rig.model.coulomb.is_some(),
@@ -81,6 +81,7 @@ fn facts(rig: &Rig) -> PlainRig {
         knows_place: rig.encoder.absolute || rig.encoder.start_spread.is_some(),
         turn: rig.turn(),
         is_rotary: rig.kind == Kind::Rotary,
+        one_way,
     }
 }
 
@@ -94,12 +95,13 @@ struct Tried {
 struct Selecting {
     axes: Vec<Axis>,
     fits: usize,
+    one_way: bool,
 }
 
 impl Selecting {
     fn select(&self, rig: &Rig) -> PlainSelection {
         let motions: Vec<PlainMotion> = self.axes.iter().map(|axis| axis.motion.clone()).collect();
-        let laws = plain_laws(&facts(rig), &motions);
+        let laws = plain_laws(&facts(rig, self.one_way), &motions);
         let recorded: Vec<Vec<f64>> = motions.into_iter().map(|motion| motion.drive).collect();
         // A law that does not rest on the predicted command is the same in every round.
         let fixed = parallel::map_all(&laws, |law| (!law.by_command).then(|| self.columns(law, &recorded)));
@@ -248,7 +250,7 @@ mod tests {
     }
 
     fn names(fit: &[Recording], holdout: &[Recording]) -> Vec<N> {
-        let selection = PlainSelection::new(&rig(), 0.0, [fit, holdout]);
+        let selection = PlainSelection::new(&rig(), 0.0, false, [fit, holdout]);
         assert!(selection.knows(&[N::QuadraticDrag, N::CommandDelay]) && !selection.knows(&[N::Backlash]));
         selection.found.iter().filter(|one| one.share >= 0.15).map(|one| one.name).collect()
     }
@@ -270,7 +272,7 @@ mod tests {
     #[test]
     fn a_constant_force_is_neither_found_nor_denied() {
         let constant = [1, 2].map(|seed| recording(seed, 8000, |_, _| 1.5));
-        let selection = PlainSelection::new(&rig(), 0.0, [&constant[..1], &constant[1..]]);
+        let selection = PlainSelection::new(&rig(), 0.0, false, [&constant[..1], &constant[1..]]);
         assert!(!selection.has_one_of(&[N::AsymmetricFriction]), "{:?}", selection.found);
         assert!(!selection.knows(&[N::AsymmetricFriction]));
     }

@@ -32,6 +32,12 @@ const BITS: [u32; 6] = [8, 10, 12, 16, 24, 32];
 const SIGNS: [u32; 6] = [7, 9, 10, 11, 14, 15];
 /// Numbers that are decoded well change by less than this part of what they change by as they are.
 const SMOOTHER: f64 = 0.75;
+/// Sizes of a force both ways are as large as each other within this part, reach no more than this
+/// part of what a register holds, and begin below that: then it need only be smoother at all, as a
+/// large dry friction jumps however it is decoded.
+const ALIKE: f64 = 0.1;
+const FULL: f64 = 0.94;
+const SMALL: f64 = 0.125;
 /// So few different numbers of either sign show nothing.
 const FEWEST: usize = 20;
 
@@ -117,7 +123,19 @@ fn seen(role: Role, values: &[f64]) -> Option<Encoding> {
         let decoded = finite.iter().map(|x| best.1.decoded(*x)).filter(|x| (*x < 0.0) == is_negative);
         decoded.map(|x| x as i64).collect::<BTreeSet<_>>().len() >= FEWEST
     };
-    (best.0 < SMOOTHER * travel(Encoding::Plain) && different(true) && different(false)).then_some(best.1)
+    let least = if is_mirrored(best.1, &finite) { 1.0 } else { SMOOTHER };
+    (best.0 < least * travel(Encoding::Plain) && different(true) && different(false)).then_some(best.1)
+}
+
+/// True if numbers with their sign in a bit have the same sizes with it and without, and none is
+/// between the largest without it and the bit.
+fn is_mirrored(encoding: Encoding, values: &[f64]) -> bool {
+    let Encoding::Sign(bit) = encoding else { return false };
+    let size = f64::from(bit).exp2();
+    let without = values.iter().filter(|x| **x < size).fold(0.0_f64, |most, x| most.max(*x));
+    let with = values.iter().filter(|x| **x >= size).map(|x| x - size);
+    let (low, high) = with.fold((size, 0.0_f64), |(low, high), x| (low.min(x), high.max(x)));
+    (without - high).abs() < ALIKE * high && without < FULL * size && low < SMALL * size
 }
 
 #[cfg(test)]
@@ -148,6 +166,15 @@ mod tests {
             assert_eq!(seen(Role::Command, &registers), Some(of));
             assert!(registers.iter().zip(&wave).all(|(r, x)| (of.decoded(*r) - x).abs() < 1e-9), "{of:?}");
         }
+        // Dry friction jumps by twice its size where the motion turns back.
+        let dry = |i: i32| {
+            let angle = f64::from(i) * 0.05;
+            (500.0 * (angle.sin() * 20.0).clamp(-1.0, 1.0) + 80.0 * angle.cos()).round()
+        };
+        let signed: Vec<f64> = (0..500).map(dry).map(|x| if x < 0.0 { 1024.0 - x } else { x }).collect();
+        assert_eq!(seen(Role::Command, &signed), Some(Encoding::Sign(10)));
+        let centred: Vec<f64> = (0..500).map(|i| 512.0 + 0.8 * dry(i).round()).map(f64::round).collect();
+        assert_eq!(seen(Role::Command, &centred), None, "half of the range is zero");
         let shifted: Vec<f64> = wave.iter().map(|x| x + 40_000.0).collect();
         assert_eq!(seen(Role::Command, &shifted), None);
         let turning: Vec<f64> = (0..500).map(|i| f64::from(i * 37 % 4096)).collect();

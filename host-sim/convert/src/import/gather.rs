@@ -62,9 +62,7 @@ pub(super) fn gather(logs: &[Log], said: Said, notes: &mut Vec<String>) -> Resul
     let is_said = |role: Role| said.columns.iter().any(|c| c.role == role);
     // Everything that only a person can know is asked at once.
     let mut questions = missing(logs, &found, said.known);
-    if !is_said(Role::Velocity) {
-        leave_out_velocity(logs, &mut found, notes);
-    }
+    leave_out_velocity(logs, &mut found, notes);
     let units = units(logs, &mut found, &is_said, &mut questions, notes);
     if !questions.is_empty() {
         return Err(Error::input(questions.join("; and ")));

@@ -79,15 +79,11 @@ fn count(out: &mut String, x: f64, whole: bool) {
 }
 
 fn csv(run: &Rows, scale: Scale, out: &mut impl std::io::Write) -> std::io::Result<()> {
-    let optional: Vec<(Role, &str)> = [
-        (Role::Tilt, "tilt_rad"),
-        (Role::Reference, "reference_counts"),
-        (Role::Force, "force"),
-        (Role::Velocity, "velocity"),
-    ]
-    .into_iter()
-    .filter(|(role, _)| run.columns.contains_key(role))
-    .collect();
+    let optional: Vec<(Role, &str)> =
+        [(Role::Tilt, "tilt_rad"), (Role::Reference, "reference_counts"), (Role::Force, "force")]
+            .into_iter()
+            .filter(|(role, _)| run.columns.contains_key(role))
+            .collect();
     let mut line = String::from("time_s,command,position_counts");
     for (_, name) in &optional {
         line.push(',');

@@ -3,6 +3,7 @@
 
 use super::{folder, refused, run, run_well, text};
 use diagnosis::recording::Recording;
+use serde_json::Value;
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 
@@ -88,3 +89,28 @@ pub(crate) fn holds(name: &str, recording: &Recording, begin: f64, (per_unit, ga
 
 pub(crate) const PER_UNIT: f64 = COUNTS / TAU;
 pub(crate) const EXACT: (f64, f64, f64) = (PER_UNIT, 1.0, 1e-6);
+
+/// Imports a file and diagnoses its last two fifths by its first three; `diagnosis.json`.
+pub(crate) fn report(name: &str, content: &str, options: &[&str]) -> Value {
+    let (path, out) = file(&format!("{name}.csv"), content);
+    import(&path, &out, &[&["--split", "0.6"], options].concat());
+    let [rig, fit, holdout, report] =
+        ["rig.toml", "fit.csv", "holdout.csv", "report"].map(|file| out.join(file));
+    let sources = ["--rig", text(&rig), "--fit", text(&fit), "--holdout", text(&holdout)];
+    run_well(&[&["diagnose"][..], &sources, &["--out", text(&report)]].concat());
+    let json = std::fs::read_to_string(report.join("diagnosis.json")).expect("it is there");
+    serde_json::from_str(&json).expect("it is JSON")
+}
+
+/// That a report names the friction of the axis with its values, within a tenth.
+pub(crate) fn has_values(name: &str, report: &Value) {
+    let effects = report["effects"].as_array().expect("effects");
+    for (effect, parameter, truth) in
+        [("coulomb_friction", "coulomb", AXIS[2]), ("viscous_friction", "viscous", AXIS[1])]
+    {
+        let found = effects.iter().find(|e| e["name"] == effect);
+        let found = found.unwrap_or_else(|| panic!("{name}: {effect}: {report:#}"));
+        let found = found["parameters"][parameter]["value"].as_f64().expect("a value");
+        assert!((found / truth - 1.0).abs() < 0.1, "{name}: {parameter} {found}");
+    }
+}

@@ -2,7 +2,7 @@
 //! were held; derivatives and a low-pass on that grid.
 
 /// Cubic Hermite interpolation with slopes of the parabola through three neighbours, uneven stamps.
-pub(super) fn cubic(stamps: &[f64], values: &[f64], at: &[f64]) -> Vec<f64> {
+pub fn cubic(stamps: &[f64], values: &[f64], at: &[f64]) -> Vec<f64> {
     let n = stamps.len();
     let chord = |i: usize| (values[i + 1] - values[i]) / (stamps[i + 1] - stamps[i]);
     let slope = |i: usize| {
@@ -28,7 +28,7 @@ pub(super) fn cubic(stamps: &[f64], values: &[f64], at: &[f64]) -> Vec<f64> {
 }
 
 /// The mean of a held signal over the cell of width `h` about each grid point.
-pub(super) fn cells(stamps: &[f64], values: &[f64], at: &[f64], h: f64) -> Vec<f64> {
+pub fn cells(stamps: &[f64], values: &[f64], at: &[f64], h: f64) -> Vec<f64> {
     let n = stamps.len();
     let mut sum = vec![0.0; n];
     for i in 1..n {
@@ -52,7 +52,7 @@ pub(super) fn cells(stamps: &[f64], values: &[f64], at: &[f64], h: f64) -> Vec<f
 }
 
 /// Mean of the sign over the cell about each row, of a signal that goes straight from row to row.
-pub(super) fn directions(speed: &[f64]) -> Vec<f64> {
+pub fn directions(speed: &[f64]) -> Vec<f64> {
     let half = |inner: f64, outer: f64| {
         // From the row to the middle between the rows.
         let middle = 0.5 * (inner + outer);
@@ -70,7 +70,7 @@ pub(super) fn directions(speed: &[f64]) -> Vec<f64> {
 }
 
 /// First derivative, fourth order inside.
-pub(super) fn first(x: &[f64], h: f64) -> Vec<f64> {
+pub fn first(x: &[f64], h: f64) -> Vec<f64> {
     let n = x.len();
     let of = |i: usize| {
         if i >= 2 && i + 2 < n {
@@ -84,7 +84,7 @@ pub(super) fn first(x: &[f64], h: f64) -> Vec<f64> {
 }
 
 /// Second derivative, fourth order inside, nothing at the ends.
-pub(super) fn second(x: &[f64], h: f64) -> Vec<f64> {
+pub fn second(x: &[f64], h: f64) -> Vec<f64> {
     let n = x.len();
     let of = |i: usize| {
         if i < 2 || i + 2 >= n {
@@ -97,7 +97,7 @@ pub(super) fn second(x: &[f64], h: f64) -> Vec<f64> {
 
 /// Second-order Butterworth low-pass, forwards and backwards, so that nothing is late; started
 /// settled. A corner beyond 0.45 of the rate passes everything.
-pub(super) fn low_pass(x: &[f64], rate: f64, corner_hz: f64) -> Vec<f64> {
+pub fn low_pass(x: &[f64], rate: f64, corner_hz: f64) -> Vec<f64> {
     if x.is_empty() || corner_hz >= 0.45 * rate {
         return x.to_vec();
     }
