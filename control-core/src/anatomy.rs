@@ -16,46 +16,27 @@
 //! therefore makes no layer come and go: at 15° it moves a vein by 0.07 mm.
 
 mod layers;
+mod line;
+mod turning;
 
 pub(crate) use layers::{
     Anatomy, LARGEST_ANGLE, Layer, Passage, SMALLEST_ANGLE, Vessel, Wall, is_vessel_wall,
 };
 
 use crate::event::{Transitions, VesselState};
-use crate::math::{reciprocal, sine, truncating_product};
+use crate::math::truncating_product;
 use crate::tissue::MAX_LAYERS;
 use crate::units::{Millimetres, Milliradians};
 use fixed::types::{I2F30, I8F24, I16F16};
 use layers::Angle;
+use line::LatestLine;
+pub use line::NeedleLine;
+pub(crate) use turning::LOOK_TICKS;
+use turning::Turning;
 
 /// A layer is left when the tip is this far outside it: 0.2 mm along the needle, so that a tremor
 /// does not heal a wall.
 const EXIT_DISTANCE: I16F16 = I16F16::from_bits(13_107);
-/// Ticks from one look at the tilt to the next.
-pub(crate) const LOOK_TICKS: u32 = 16;
-/// Share of the way to the measured tilt at each look, as a shift: with [`LOOK_TICKS`], a time
-/// constant of 51 ms.
-const SMOOTHING: u32 = 5;
-/// The angle follows what is smoothed once it is this far off: 0.75 mrad in Q16.
-const DEAD_BAND: u32 = 49_152;
-
-/// A new angle on its way, a part in each of four ticks: all of it in one would make that tick the
-/// longest of all.
-#[derive(Clone, Copy, Debug, Default)]
-enum Turning {
-    /// The angle that was taken over holds.
-    #[default]
-    Done,
-    /// The needle has turned to this angle.
-    To(Milliradians),
-    /// And this is its sine.
-    Sine(Milliradians, I2F30),
-    /// All that there is to know of it.
-    Whole(Angle),
-    /// And the layers begin at [`Insertion::next_tops`] then.
-    Placed(Angle),
-}
-
 /// The tip's place among the layers. It comes through layers and walls in their order, so that two
 /// numbers say which it has touched and which have given way; it meets or leaves at most one layer
 /// a tick.
@@ -70,6 +51,12 @@ pub(crate) struct Insertion {
     next_tops: [I16F16; MAX_LAYERS],
     /// The depth of each layer along the needle.
     tops: [I16F16; MAX_LAYERS],
+    /// The depth of each layer perpendicular to the skin, and where the needle passes beside the
+    /// vessel: those of the anatomy, or on their way to those of a [`NeedleLine`].
+    depths: [I16F16; MAX_LAYERS],
+    beside_depth: I16F16,
+    /// The latest [`NeedleLine`], perpendicular to the skin.
+    line: LatestLine,
     /// The depth at which the tip began to push in each wall.
     origins: [I16F16; MAX_LAYERS],
     /// The distance of that from the layer's top, because the wall was carried along.
@@ -102,6 +89,9 @@ impl Insertion {
             smoothed: i32::from(LARGEST_ANGLE.0) << 16,
             turning: Turning::To(LARGEST_ANGLE),
             next_tops: [I16F16::ZERO; MAX_LAYERS],
+            depths: [I16F16::ZERO; MAX_LAYERS],
+            beside_depth: I16F16::MAX,
+            line: LatestLine::default(),
             tops: [I16F16::ZERO; MAX_LAYERS],
             origins: [I16F16::ZERO; MAX_LAYERS],
             carried: [I16F16::ZERO; MAX_LAYERS],
@@ -115,6 +105,12 @@ impl Insertion {
             busy: 0,
             vessel: VesselState::Outside,
         };
+        for (depth, layer) in insertion.depths.iter_mut().zip(&anatomy.layers) {
+            *depth = layer.depth.0;
+        }
+        if let Some(Vessel::Beside { depth, .. }) = anatomy.vessel {
+            insertion.beside_depth = depth.0;
+        }
         insertion.turn_at_once(anatomy);
         insertion
     }
@@ -219,72 +215,6 @@ impl Insertion {
         }
         self.pass_beside(anatomy, depth);
         transitions
-    }
-
-    /// Takes over the tilt as it is, all at once. Like its parts out of the way of the ticks that
-    /// look at nothing.
-    #[cold]
-    #[inline(never)]
-    pub(crate) fn look_anew(&mut self, anatomy: &Anatomy, tilt: Milliradians) {
-        self.look(anatomy, tilt);
-        self.turn_at_once(anatomy);
-    }
-
-    fn turn_at_once(&mut self, anatomy: &Anatomy) {
-        while !matches!(self.turning, Turning::Done) {
-            self.turn(anatomy);
-        }
-    }
-
-    /// Follows the tilt, every [`LOOK_TICKS`].
-    #[inline(never)]
-    pub(crate) fn look(&mut self, anatomy: &Anatomy, tilt: Milliradians) {
-        let measured = i32::from(anatomy.angle(tilt).0) << 16;
-        self.smoothed = if core::mem::take(&mut self.is_new) {
-            measured
-        } else {
-            self.smoothed + ((measured - self.smoothed) >> SMOOTHING)
-        };
-        let off = self.smoothed - (i32::from(self.angle.taken.0) << 16);
-        if off.unsigned_abs() > DEAD_BAND && matches!(self.turning, Turning::Done) {
-            self.turning = Turning::To(Milliradians(((self.smoothed + (1 << 15)) >> 16) as i16));
-        }
-    }
-
-    /// The next part of taking over an angle, if one is on its way: three times in [`LOOK_TICKS`],
-    /// so that it is there 3 ms after the look.
-    #[inline(never)]
-    pub(crate) fn turn(&mut self, anatomy: &Anatomy) {
-        self.turning = match self.turning {
-            Turning::Done => Turning::Done,
-            Turning::To(angle) => Turning::Sine(angle, sine(angle)),
-            Turning::Sine(taken, sine) => {
-                Turning::Whole(Angle { taken, path_per_depth: reciprocal(sine), depth_per_path: sine })
-            }
-            Turning::Whole(angle) => {
-                for (top, layer) in self.next_tops.iter_mut().zip(&anatomy.layers) {
-                    *top = angle.along(layer.depth);
-                }
-                Turning::Placed(angle)
-            }
-            Turning::Placed(angle) => {
-                self.meet_at(anatomy, angle);
-                Turning::Done
-            }
-        };
-    }
-
-    /// Takes over `angle` and where the layers begin at it.
-    fn meet_at(&mut self, anatomy: &Anatomy, angle: Angle) {
-        self.angle = angle;
-        self.tops = self.next_tops;
-        for ((origin, carried), wall) in self.origins.iter_mut().zip(self.carried).zip(&anatomy.walls) {
-            let top = self.tops.get(wall.layer).copied().unwrap_or(I16F16::MAX);
-            *origin = top.saturating_add(carried);
-        }
-        if let Some(Vessel::Beside { depth }) = anatomy.vessel {
-            self.beside = angle.along(depth);
-        }
     }
 
     /// Returns the extra depth of the next layer where the tip comes to it, due to the remaining

@@ -18,6 +18,7 @@ use crate::runaway;
 use crate::safety::Limiter;
 use crate::stillness::Stillness;
 use crate::thermal::Winding;
+use crate::tissue::MAX_LAYERS;
 use crate::units::{Counts, Millimetres, MillimetresPerSecond, MillinewtonMetres, Milliradians};
 use core::borrow::BorrowMut;
 pub use exchange::{AnyOrder, LargeOrder, Order, Sample, TickInput, TickOutput};
@@ -185,6 +186,11 @@ impl Core {
     }
 
     #[inline]
+    fn take_line(&mut self, depths: &[Millimetres]) {
+        self.insertion.take_line(&self.plan.anatomy, depths);
+    }
+
+    #[inline]
     fn set_lines_agree(&mut self, agree: bool) {
         self.lines_agree = agree;
     }
@@ -192,6 +198,9 @@ impl Core {
     /// As if the needle had never been in this tissue.
     fn withdraw(&mut self) {
         self.insertion = Insertion::new(&self.plan.anatomy);
+        for layer in 0..MAX_LAYERS {
+            self.plan.law.place(self.insertion.depths(), layer);
+        }
         self.memory = self.plan.law.memory();
     }
 

@@ -46,6 +46,7 @@ mod tissue;
 pub mod units;
 mod wall;
 
+pub use anatomy::NeedleLine;
 pub use config::{Config, Device, Patient};
 pub use controller::{AnyOrder, Controller, LargeOrder, Order, TickInput, TickOutput};
 pub use plan::{Plan, Refusal};

@@ -5,7 +5,7 @@
 mod layers;
 
 use crate::TICK_HZ;
-use crate::anatomy::Anatomy;
+use crate::anatomy::{Anatomy, NeedleLine};
 use crate::compensation::{check, feedforward};
 use crate::config::{Config, Device, Patient, Tissue};
 use crate::kinematics::{Scale, counts_reaching, mm_per_count};
@@ -69,15 +69,7 @@ impl Plan {
         let scale = Scale::new(mm_per_count);
         within(Field::Scale, patient.scale, milli(100), I16F16::ONE)?;
         let met = layers::met(config)?;
-        let force_limits = law::ForceLimits {
-            layers: &met.layers,
-            configured: patient.layers.len(),
-            travel: device.limits.travel.0,
-            largest: largest_asked(config),
-            stiffest: stiffest(config),
-            count: I16F16::saturating_from_num(mm_per_count),
-        };
-        let law = law::PreparedLaw::new(&patient.law, &force_limits)?;
+        let law = law::PreparedLaw::new(&patient.law, &force_limits(config, &met.layers))?;
         let anatomy = layers::plan(config, &met, law.ruptures());
         let lever = device.roller_radius.0.saturating_mul(patient.scale);
         let fade_ticks = i32::from(config.device.limits.fade_in_ms.cast_signed()) * (TICK_HZ / 1000) as i32;
@@ -117,6 +109,13 @@ impl Plan {
         })
     }
 
+    /// Checks a line of the needle as [`Plan::new`] would a patient whose layers it meets there:
+    /// one depth for each layer, each deeper than the one before and within the travel, and no more
+    /// force than the motor gives.
+    pub fn check_line(&self, line: &NeedleLine) -> Result<(), Refusal> {
+        layers::check_line(self, line)
+    }
+
     /// The configuration that this came from.
     pub fn config(&self) -> &Config {
         &self.config
@@ -150,6 +149,19 @@ impl Plan {
     /// The code of zero torque.
     pub fn zero_torque_code(&self) -> crate::units::DacCode {
         self.dac.zero()
+    }
+}
+
+/// The bounds of a law that acts in `layers`.
+fn force_limits<'a>(config: &Config, layers: &'a [law::LayerHit]) -> law::ForceLimits<'a> {
+    let Device { roller_radius, counts_per_turn, limits, .. } = config.device;
+    law::ForceLimits {
+        layers,
+        configured: config.patient.layers.len(),
+        travel: limits.travel.0,
+        largest: largest_asked(config),
+        stiffest: stiffest(config),
+        count: I16F16::saturating_from_num(mm_per_count(roller_radius, counts_per_turn)),
     }
 }
 

@@ -112,6 +112,26 @@ impl Wall {
     }
 }
 
+/// The force at which a wall gives way.
+pub(crate) fn peak(wall: &tissue::Wall) -> I16F16 {
+    Parabola::new(&wall.elastic).force(wall.puncture_travel).0
+}
+
+/// The steepest rise of a wall that is pushed in, N/mm.
+pub(crate) fn steepest_rise(wall: &tissue::Wall) -> I16F16 {
+    slope_at_puncture(wall, &wall.elastic)
+}
+
+/// The steepest change of a wall that has given way, N/mm.
+pub(crate) fn steepest_fall(wall: &tissue::Wall) -> I16F16 {
+    slope_at_puncture(wall, &wall.relief).max(wall.unload.0)
+}
+
+fn slope_at_puncture(wall: &tissue::Wall, parabola: &tissue::Parabola) -> I16F16 {
+    let from_vertex = wall.puncture_travel.0.saturating_sub(parabola.vertex.0).saturating_abs();
+    from_vertex.saturating_mul_int(2).saturating_div(parabola.compliance.0)
+}
+
 /// Those of `layers` that have one, outermost first.
 pub(crate) fn all<'a>(layers: impl Iterator<Item = &'a tissue::Layer>) -> Vec<Wall, MAX_LAYERS> {
     layers.filter_map(|layer| layer.wall.as_ref()).map(Wall::new).collect()

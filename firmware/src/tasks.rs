@@ -1,6 +1,7 @@
 //! The work of the tasks. None of them knows a pin; only the tick may give torque, and it alone
 //! touches the drive.
 
+mod latest_line;
 pub mod queues;
 pub mod shared;
 pub mod supervisor;

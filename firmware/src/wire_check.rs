@@ -1,5 +1,12 @@
 //! Finds a wire that is off: a line that somebody drives stays where it is whichever way it is
 //! pulled, one without a wire goes along. And whether the encoder has power.
+//!
+//! A look takes two settling times, 40 µs, and up to 80 µs where ticks interrupt it. From 25 counts
+//! a millisecond on, a sound line may be low for less than that, two counts of four, and be read as
+//! if it went along: look after look, where a millisecond is a whole number of its periods. But a
+//! count that runs needs the edges of both lines, and then both are driven.
+
+use control_core::units::Counts;
 
 /// Which way the inputs are pulled, by some 40 kΩ.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -13,6 +20,8 @@ pub enum Pull {
 pub trait PulledLines {
     /// All of them, a bit each.
     const ALL: u8;
+    /// The encoder's count.
+    fn count(&self) -> Counts;
     /// True if the encoder's supply is there, as far as it is wired to be sensed: without that wire
     /// it is not.
     fn has_supply(&self) -> bool;
@@ -27,6 +36,10 @@ pub trait PulledLines {
 /// Looks that must agree: an edge of a line that is driven may fall between two readings of one
 /// look, but hardly in two.
 const LOOKS: u8 = 2;
+
+/// An encoder that counts so much from one look to the next has both of its lines: with one of them
+/// off it counts two edges of the pulls and one of the other line before, between and behind them.
+const RUNNING_COUNTS: u32 = 8;
 
 /// Looks in a row for which the supply must have been there before its absence means anything: 0.1
 /// s.
@@ -48,6 +61,8 @@ pub struct Wires {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct WireWatch {
     looks: u8,
+    /// The count at the look before.
+    count: Counts,
     /// Looks in a row in which the supply was there; once they are enough, it is sensed.
     supplied: u8,
     unsupplied: u8,
@@ -56,13 +71,15 @@ pub struct WireWatch {
 impl WireWatch {
     /// Nothing seen.
     pub const fn new() -> Self {
-        Self { looks: 0, supplied: 0, unsupplied: 0 }
+        Self { looks: 0, count: Counts(0), supplied: 0, unsupplied: 0 }
     }
 
     /// A look at `lines`, which have been pulled up since the look before.
     pub fn look<L: PulledLines>(&mut self, lines: &mut L) -> Wires {
         let (driven_high, floating) = pulled(lines);
-        self.looks = if floating == 0 { 0 } else { (self.looks + 1).min(LOOKS) };
+        let before = core::mem::replace(&mut self.count, lines.count());
+        let runs = self.count.0.wrapping_sub(before.0).unsigned_abs() >= RUNNING_COUNTS;
+        self.looks = if floating == 0 || runs { 0 } else { (self.looks + 1).min(LOOKS) };
         let off = self.looks == LOOKS || self.has_lost_supply(lines.has_supply());
         let agree = driven_high == 0 || driven_high == L::ALL;
         Wires { off, agree, supply_sensed: self.is_sensed() }
@@ -119,10 +136,15 @@ mod tests {
         readings: usize,
         settled: bool,
         has_supply: bool,
+        count: i32,
     }
 
     impl PulledLines for Two {
         const ALL: u8 = 0b11;
+
+        fn count(&self) -> Counts {
+            Counts(self.count)
+        }
 
         fn has_supply(&self) -> bool {
             self.has_supply
@@ -144,8 +166,12 @@ mod tests {
         }
     }
 
+    fn two(driven: [Driver; 2]) -> Two {
+        Two { driven, pull: Pull::Up, readings: 0, settled: true, has_supply: false, count: 0 }
+    }
+
     fn trips(driven: [Driver; 2], looks: usize) -> Option<usize> {
-        let mut lines = Two { driven, pull: Pull::Up, readings: 0, settled: true, has_supply: false };
+        let mut lines = two(driven);
         let mut watch = WireWatch::new();
         (1..=looks).find(|_| {
             // A millisecond passes.
@@ -168,11 +194,28 @@ mod tests {
         assert_eq!(trips([Some(|n| n % 7 != 2), Some(|n| n % 5 == 0)], 1_000), None);
     }
 
+    /// 100 counts a millisecond, 25 periods of a line, which is high, low and high at the readings
+    /// of each look. A roller of 4 mm with 65,535 counts a turn gives them at 38 mm/s.
+    #[test]
+    fn a_fast_encoder_is_not_taken_for_a_wire_that_is_off() {
+        let in_step: Driver = Some(|n| n % 3 != 2);
+        let off = |counts: i32| {
+            let driven = [in_step, Some(|_| true)];
+            let mut lines = two(driven);
+            let mut watch = WireWatch::new();
+            (0..1_000).any(|_| {
+                lines.count = lines.count.wrapping_add(counts);
+                watch.look(&mut lines).off
+            })
+        };
+        assert!(!off(100) && !off(-100) && !off(24));
+        assert!(off(5), "a line without a wire, whose pulls are counted");
+    }
+
     #[test]
     fn a_wire_that_comes_back_is_there_again() {
         let mut watch = WireWatch::new();
-        let mut lines =
-            Two { driven: [None, None], pull: Pull::Up, readings: 0, settled: true, has_supply: false };
+        let mut lines = two([None, None]);
         assert_eq!([0; 3].map(|_| watch.look(&mut lines).off), [false, true, true]);
         lines.driven = [Some(|_| true), Some(|_| true)];
         assert!(!watch.look(&mut lines).off);
@@ -181,7 +224,7 @@ mod tests {
     #[test]
     fn lines_agree_where_no_two_are_held_apart() {
         let agree = |driven: [Driver; 2]| {
-            let mut lines = Two { driven, pull: Pull::Up, readings: 0, settled: true, has_supply: false };
+            let mut lines = two(driven);
             WireWatch::new().look(&mut lines).agree
         };
         assert!(agree([Some(|_| true), Some(|_| true)]) && agree([Some(|_| false), Some(|_| false)]));
@@ -193,7 +236,7 @@ mod tests {
     fn a_supply_that_was_there_is_missed_in_two_looks() {
         let mut watch = WireWatch::new();
         let driven: [Driver; 2] = [Some(|_| false), Some(|_| false)];
-        let mut lines = Two { driven, pull: Pull::Up, readings: 0, settled: true, has_supply: false };
+        let mut lines = two(driven);
         assert!((0..1_000).all(|_| !watch.look(&mut lines).off), "without its wire it is not sensed");
         lines.has_supply = true;
         assert!((0..100).all(|_| !watch.look(&mut lines).off));

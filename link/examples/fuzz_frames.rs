@@ -3,10 +3,10 @@
 //! next whole frame must be read.
 
 use control_core::compensation::{Gain, Gains};
-use control_core::config::Config;
+use control_core::config::{Config, MAX_LAYERS};
 use control_core::excitation::{Excitation, MAX_SEGMENTS, Servo, Signal};
 use control_core::units::{Damping, Millimetres, MillimetresPerSecond, MillinewtonMetres, Stiffness};
-use control_core::{AnyOrder, Controller, LargeOrder, TickInput};
+use control_core::{AnyOrder, Controller, LargeOrder, NeedleLine, TickInput};
 use link::codec::{self, MAX_FRAME};
 use link::commissioning::Record;
 use link::device::{Endpoint, Identity};
@@ -68,7 +68,7 @@ fn encoded(frame: &HostFrame) -> Vec<u8> {
 
 /// `sent` are the segments that a device has which has taken each of them.
 fn command(random: &mut fastrand::Rng, id: u32, sent: &mut Vec<Excitation>) -> Vec<u8> {
-    let command = match random.u8(0..24) {
+    let command = match random.u8(0..25) {
         0 => Command::Hello { version: random.u16(0..3) },
         1 => Command::ConfigurePatient(config(random).patient),
         6 => Command::ConfigureDevice(config(random).device),
@@ -89,9 +89,22 @@ fn command(random: &mut fastrand::Rng, id: u32, sent: &mut Vec<Excitation>) -> V
         5 => Command::Heartbeat,
         20 => Command::GuardSupply { set: random.bool() },
         21 => Command::Clear,
+        22 => Command::Line(line(random)),
         _ => return (0..random.usize(0..1500)).map(|_| random.u8(..)).collect(),
     };
     encoded(&HostFrame { id, command })
+}
+
+/// The default patient's layers, some of them anywhere.
+fn line(random: &mut fastrand::Rng) -> NeedleLine {
+    let any = |random: &mut fastrand::Rng| random.i32(..) >> random.u32(0..32);
+    let patient = config(random).patient;
+    let depths = patient.layers.iter().map(|layer| layer.depth);
+    let mut depths: heapless::Vec<Millimetres, MAX_LAYERS> = depths.collect();
+    if random.u8(0..4) == 0 {
+        let _ = depths.push(Millimetres(fixed::types::I16F16::from_bits(any(random))));
+    }
+    NeedleLine { depths }
 }
 
 /// The next segment of a sequence, the first of another one, or any at any place.
@@ -212,6 +225,9 @@ fn run(
 ) {
     let mut out = [0; MAX_FRAME];
     for _ in 0..random.u8(0..40) {
+        if let Some(line) = device.take_line() {
+            controller.take_line(&line.depths);
+        }
         while let Some(order) = device.next_order() {
             if matches!(order, AnyOrder::Large(LargeOrder::Play(_))) {
                 assert!(device.in_session(), "a sequence outlived its session");

@@ -19,7 +19,7 @@ use control_core::ceilings::Ceilings;
 use control_core::config::{Sensors, Tissue};
 use control_core::event::{Fault, Limits};
 use control_core::interlock::Interlocks;
-use control_core::{AnyOrder, Order, Plan, TICK_HZ, TickOutput};
+use control_core::{AnyOrder, NeedleLine, Order, Plan, TICK_HZ, TickOutput};
 use core::borrow::BorrowMut;
 use guard::Guard;
 use heapless::HistoryBuf;
@@ -77,6 +77,10 @@ pub struct Endpoint<W = Waiting> {
     /// The id of the session's last stop.
     last_stop: Option<u32>,
     stop_due: bool,
+    /// The latest line, with its id, until the control law takes it.
+    line_due: Option<(u32, NeedleLine)>,
+    /// Its answer: in no queue, so that a flood of lines pushes no other answer out.
+    line_ack: Option<Ack>,
     /// True if a stop has come since the fault.
     stopped_since_fault: bool,
     /// The sequence that waits for [`crate::Command::Play`].
@@ -127,6 +131,8 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
             ahead: Ahead::default(),
             last_stop: None,
             stop_due: false,
+            line_due: None,
+            line_ack: None,
             stopped_since_fault: false,
             upload: Upload::NOTHING,
             now: 0,
@@ -178,6 +184,8 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
     /// more.
     pub fn disconnect(&mut self) {
         self.in_session = false;
+        self.waiting.borrow_mut().acks.clear();
+        (self.line_due, self.line_ack) = (None, None);
         self.drop_starts();
         self.decoder = Decoder::default();
         self.forget_waiting();
@@ -215,6 +223,16 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
     /// more.
     pub fn take_stop(&mut self) -> bool {
         core::mem::take(&mut self.stop_due)
+    }
+
+    /// Returns the latest line once, if it is sound, and answers it; those that it has overtaken
+    /// are not answered. It overtakes the orders too: whoever passes them on to the control law
+    /// gives it this first. It is checked here, so that many of them hold nothing up.
+    pub fn take_line(&mut self) -> Option<NeedleLine> {
+        let (id, line) = self.line_due.take()?;
+        let result = self.plan.check_line(&line).map_err(CommandRefusal::Config);
+        self.line_ack = Some(Ack { id, result });
+        result.is_ok().then_some(line)
     }
 
     /// The configuration in force was not saved.
@@ -292,6 +310,9 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
             return Some(DeviceFrame::Crash(crash.clone()));
         }
         if let Some(ack) = self.waiting.borrow_mut().acks.pop_front() {
+            return Some(DeviceFrame::Ack(ack));
+        }
+        if let Some(ack) = self.line_ack.take() {
             return Some(DeviceFrame::Ack(ack));
         }
         if !self.in_session {
@@ -419,8 +440,8 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
         let _ = self.waiting.borrow_mut().blocks.push_back(block);
     }
 
+    /// Nothing that was to be streamed is sent. Answers are: a stop may stand right before a hello.
     fn forget_waiting(&mut self) {
-        self.waiting.borrow_mut().acks.clear();
         self.waiting.borrow_mut().events.clear();
         self.waiting.borrow_mut().blocks.clear();
         self.filling = SampleBlock::default();

@@ -5,6 +5,7 @@ use crate::build::Build;
 use crate::crash::Crash;
 pub use crate::guard::GuardRefusal;
 use crate::record::Record;
+use control_core::NeedleLine;
 use control_core::compensation::Gains;
 use control_core::config::{DacWidth, Device, Patient};
 use control_core::controller::Sample;
@@ -18,7 +19,7 @@ use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
 /// Version of what follows; a PC refuses another.
-pub const PROTOCOL_VERSION: u16 = 10;
+pub const PROTOCOL_VERSION: u16 = 11;
 /// Samples in a full block: 3.2 ms.
 pub const BLOCK_SAMPLES: usize = 32;
 /// Pose frames a second.
@@ -400,4 +401,11 @@ pub enum Command {
         /// True to set it.
         set: bool,
     },
+    /// The layers along a needle that has turned in tissue, torque on or off; taken whole or
+    /// refused with the reason. The latest counts, waits behind no order, and is the one that is
+    /// answered. It changes the force on a needle at rest by at most 10 mN, touches no layer and
+    /// lets no wall give way: what it leaves to do, the next one or the needle's own movement does.
+    /// Send it 50 to 70 times a second while the needle turns. It holds until the zero, an
+    /// excitation or another configuration.
+    Line(NeedleLine),
 }

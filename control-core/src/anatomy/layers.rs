@@ -65,8 +65,9 @@ impl Passage {
 pub(crate) enum Vessel {
     /// Its near and its far wall.
     Met { near: Passage, far: Option<Passage> },
-    /// The needle passes beside it from this depth on, perpendicular to the skin.
-    Beside { depth: Millimetres },
+    /// The needle passes beside it from this depth on, perpendicular to the skin: that of the
+    /// near wall, layer `number` of the configuration.
+    Beside { depth: Millimetres, number: u8 },
 }
 
 /// The anatomy ready for the tick. [`crate::plan`] has checked it.
@@ -77,6 +78,11 @@ pub(crate) struct Anatomy {
     pub(crate) vessel: Option<Vessel>,
     /// The sensor's tilt with the needle laid on the skin.
     pub(crate) skin_tilt: i16,
+    /// The number of layers that are configured.
+    pub(crate) configured: usize,
+    /// The way along the needle by which a line moves a layer that the tip has touched, at most;
+    /// for each number of walls that have given way.
+    pub(crate) line_steps: Vec<I16F16, { MAX_LAYERS + 1 }>,
 }
 
 /// The angle to the skin at which the layers are met.
@@ -93,6 +99,11 @@ impl Angle {
     /// Along the needle, for a depth perpendicular to the skin of up to 2,000 mm.
     pub(super) fn along(&self, depth: Millimetres) -> I16F16 {
         I16F16::from_bits(truncating_product(depth.0.to_bits(), self.path_per_depth.to_bits(), 24))
+    }
+
+    /// Perpendicular to the skin, for a length along the needle.
+    pub(super) fn below_skin(&self, along: I16F16) -> I16F16 {
+        I16F16::from_bits(truncating_product(along.to_bits(), self.depth_per_path.to_bits(), 30))
     }
 }
 

@@ -27,7 +27,7 @@ impl Core {
             2 => return self.winding.allow(&self.plan.thermal, self.plan.torque_limits.torque),
             10 => return self.movement.look(depth),
             3 => return self.insertion.look(&self.plan.anatomy, tilt),
-            1 | 9 | 11 => return self.insertion.turn(&self.plan.anatomy),
+            1 | 9 | 11 => return self.turn_layers(depth),
             5 | 13 => self.runaway.look(&self.plan.runaway),
             6 | 14 => return self.runaway.compare(),
             7 | 15 => self.runaway.judge(&self.plan.runaway),
@@ -37,6 +37,13 @@ impl Core {
             && self.mode.is_powered()
         {
             self.trip_by_movement(fault);
+        }
+    }
+
+    /// The next part of an angle or a line that is on its way.
+    fn turn_layers(&mut self, depth: Millimetres) {
+        if let Some(layer) = self.insertion.turn(&self.plan.anatomy, depth) {
+            self.plan.law.place(self.insertion.depths(), layer);
         }
     }
 

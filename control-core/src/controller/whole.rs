@@ -70,6 +70,15 @@ impl<S: BorrowMut<Segments>> Controller<S> {
         self.core.displace(displacement);
     }
 
+    /// Takes [`crate::NeedleLine::depths`] of a needle that has turned in tissue, in the place of
+    /// those before; they have passed [`Plan::check_line`]. It holds until the next, or until the
+    /// needle is taken for one that has never been in this tissue: at a zero, an excitation,
+    /// another plan.
+    #[inline]
+    pub fn take_line(&mut self, depths: &[Millimetres]) {
+        self.core.take_line(depths);
+    }
+
     /// Says, until it is said again, whether both of the encoder's lines are at one level, as they
     /// also are without its supply or its ground. An encoder without lines, such as a simulated
     /// one, leaves it at `false`.

@@ -8,10 +8,10 @@ use crate::kinematics::Direction;
 use crate::math::{reciprocal, saturating_product, saturating_times, sine, truncating_product};
 use crate::passivity::Elements;
 use crate::refusal::{Field, Refusal, milli, within};
-use crate::tissue::{Layer, MAX_LAYERS};
+use crate::tissue::{MAX_LAYERS, Wall};
 use crate::units::{Millimetres, Newtons, Stiffness};
 use crate::wall::{self, Cut};
-use fixed::types::{I2F30, I8F24, I16F16, I32F32};
+use fixed::types::{I2F30, I8F24, I16F16};
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
@@ -79,6 +79,27 @@ impl FrictionLaw {
             FrictionLaw::Cone { stiffness } | FrictionLaw::StickSlip { stiffness, .. } => stiffness.0,
         }
     }
+
+    /// Every wall that has given way falls or lets go, the next one rises, and friction changes
+    /// with the thickness of each layer. A needle that sticks jumps where friction lets go of it.
+    pub(crate) fn steepest(
+        &self,
+        layers: &[LayerHit],
+        (given, next): (&[Wall], Option<&Wall>),
+    ) -> Option<I16F16> {
+        let rising = next.map_or(I16F16::ZERO, wall::steepest_rise);
+        let walls = given.iter().map(wall::steepest_fall).fold(rising, I16F16::saturating_add);
+        match *self {
+            FrictionLaw::Paper { level_length, limit, limit_out, .. } => {
+                Some(walls.saturating_add(limit.0.max(limit_out.0).saturating_div(level_length.0)))
+            }
+            FrictionLaw::Cone { .. } => {
+                let twice = |met: &LayerHit| met.layer.friction.0.saturating_mul_int(2);
+                Some(layers.iter().map(twice).fold(walls, I16F16::saturating_add))
+            }
+            FrictionLaw::StickSlip { .. } => None,
+        }
+    }
 }
 
 impl PreparedJog {
@@ -86,20 +107,37 @@ impl PreparedJog {
     pub(crate) fn new(friction: &FrictionLaw, limits: &ForceLimits) -> Result<Self, Refusal> {
         check_friction(friction, limits)?;
         check_along(limits)?;
-        let mut rubs = Vec::new();
-        let mut above: Option<(&Layer, I32F32)> = None;
-        for LayerHit { layer, .. } in limits.layers {
-            let rub_above = above.map_or(I32F32::ZERO, |(last, rub)| {
-                let thickness = layer.depth.0.saturating_sub(last.depth.0);
-                rub.saturating_add(thickness.wide_mul(last.friction.0))
-            });
-            above = Some((layer, rub_above));
-            let per_mm = I2F30::saturating_from_num(layer.friction.0);
-            // It holds MAX_LAYERS: the push cannot fail.
-            let _ = rubs.push(Rub { per_mm, above: I8F24::saturating_from_num(rub_above) });
-        }
+        let rub = |met: &LayerHit| Rub {
+            per_mm: I2F30::saturating_from_num(met.layer.friction.0),
+            above: I8F24::ZERO,
+        };
         let walls = wall::all(limits.layers.iter().map(|met| &met.layer));
-        Ok(Self { walls_that_close: walls.len().min(1), walls, rubs, friction: prepare_friction(friction) })
+        let mut prepared = Self {
+            walls_that_close: walls.len().min(1),
+            walls,
+            rubs: limits.layers.iter().map(rub).collect(),
+            friction: prepare_friction(friction),
+        };
+        let depths: Vec<I16F16, MAX_LAYERS> = limits.layers.iter().map(|met| met.layer.depth.0).collect();
+        for index in 0..depths.len() {
+            prepared.place(&depths, index);
+        }
+        Ok(prepared)
+    }
+
+    /// Adds up the friction of the layers above layer `index`, where layers are met at `depths`.
+    pub(crate) fn place(&mut self, depths: &[I16F16], index: usize) {
+        let Some((thickness, last)) = index.checked_sub(1).and_then(|last| {
+            let thickness = depths.get(index)?.saturating_sub(*depths.get(last)?);
+            Some((thickness, self.rubs.get(last)?))
+        }) else {
+            return;
+        };
+        let rubbed = saturating_product(thickness.to_bits(), last.per_mm.to_bits(), 22);
+        let rubbed = last.above.saturating_add(I8F24::from_bits(rubbed));
+        if let Some(rub) = self.rubs.get_mut(index) {
+            rub.above = rubbed;
+        }
     }
 }
 
@@ -255,12 +293,14 @@ fn prepare_friction(law: &FrictionLaw) -> PreparedFriction {
 /// At whatever angle: each wall with the friction up to it, and friction at the end of the travel.
 /// The flatter the needle, the longer its way through each layer, and the force is largest where
 /// the next layer is just out of reach.
-fn check_along(limits: &ForceLimits) -> Result<(), Refusal> {
+pub(super) fn check_along(limits: &ForceLimits) -> Result<(), Refusal> {
     let travel = limits.travel;
     let flattest = reciprocal(sine(SMALLEST_ANGLE));
     let just_reached = limits.layers.iter().map(|met| reaching(travel, met.layer.depth.0).min(flattest));
+    let peak = |met: &LayerHit| met.layer.wall.as_ref().map_or(I16F16::ZERO, wall::peak);
+    let peaks: Vec<I16F16, MAX_LAYERS> = limits.layers.iter().map(peak).collect();
     for stretch in just_reached.chain([I8F24::ONE, flattest]) {
-        check_at(limits, stretch)?;
+        check_at(limits, &peaks, stretch)?;
     }
     Ok(())
 }
@@ -271,21 +311,19 @@ fn reaching(travel: I16F16, depth: I16F16) -> I8F24 {
     I8F24::saturating_from_num(fixed::types::I40F24::from_bits(wide)).max(I8F24::ONE)
 }
 
-/// The same with layers met at `stretch` times their depth.
-fn check_at(limits: &ForceLimits, stretch: I8F24) -> Result<(), Refusal> {
+/// The same with layers met at `stretch` times their depth, whose walls give way at `peaks`.
+fn check_at(limits: &ForceLimits, peaks: &[I16F16], stretch: I8F24) -> Result<(), Refusal> {
     let (travel, limit) = (limits.travel, limits.largest);
     let along = |depth: I16F16| I16F16::from_bits(truncating_product(depth.to_bits(), stretch.to_bits(), 24));
     let (mut friction, mut at, mut per_mm, mut deepest) = (I16F16::ZERO, I16F16::ZERO, I16F16::ZERO, 0);
-    for LayerHit { number, layer } in limits.layers {
+    for (LayerHit { number, layer }, &peak) in limits.layers.iter().zip(peaks) {
         let top = along(layer.depth.0);
         if top > travel {
             break;
         }
         friction = friction.saturating_add(top.saturating_sub(at).saturating_mul(per_mm));
         (at, per_mm, deepest) = (top, layer.friction.0, *number);
-        let peak =
-            layer.wall.as_ref().map(|wall| wall::Parabola::new(&wall.elastic).force(wall.puncture_travel));
-        let force = friction.saturating_add(peak.unwrap_or_default().0);
+        let force = friction.saturating_add(peak);
         if force > limit {
             return Err(Refusal::TooStrong { layer: *number, force, limit });
         }

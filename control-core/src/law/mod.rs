@@ -9,7 +9,7 @@ use crate::kinematics::Movement;
 use crate::math::truncating_product;
 use crate::passivity::Elements;
 use crate::refusal::Refusal;
-use crate::tissue::Layer;
+use crate::tissue::{Layer, Wall};
 use crate::units::{Millimetres, MillimetresPerSecond, Newtons};
 use fixed::types::{I2F30, I16F16};
 use serde::{Deserialize, Serialize};
@@ -117,6 +117,31 @@ macro_rules! laws {
             pub(crate) fn hold(&self) -> I16F16 {
                 match self { $(Law::$name(config) => config.hold()),+ }
             }
+
+            /// The largest change of the force, in N/mm, where layers that the tip has touched move
+            /// along a needle that rests: it has come through the first of `walls` and presses on
+            /// the second. `None` where the force may jump.
+            pub(crate) fn steepest(
+                &self,
+                layers: &[LayerHit],
+                walls: (&[Wall], Option<&Wall>),
+            ) -> Option<I16F16> {
+                match self {
+                    Law::Jog(config) => config.steepest(layers, walls),
+                    Law::Sparte(_) => Some(sparte::steepest(walls.1)),
+                    // Depth counts from the outermost layer, and a track that is left has another
+                    // force.
+                    Law::Xr(_) => None,
+                }
+            }
+
+            /// Checks only what depends on where the layers are.
+            pub(crate) fn check_depths(&self, limits: &ForceLimits) -> Result<(), Refusal> {
+                match self {
+                    Law::Jog(_) => jog::check_along(limits),
+                    Law::Sparte(_) | Law::Xr(_) => Ok(()),
+                }
+            }
         }
 
         impl PreparedLaw {
@@ -130,6 +155,14 @@ macro_rules! laws {
                 match self {
                     PreparedLaw::Xr(prepared) => prepared.ruptures(),
                     PreparedLaw::Jog(_) | PreparedLaw::Sparte(_) => 0,
+                }
+            }
+
+            /// Follows layer `index`, now that the layers are met at these depths, perpendicular to
+            /// the skin; one layer after the other, outermost first.
+            pub(crate) fn place(&mut self, depths: &[I16F16], index: usize) {
+                if let PreparedLaw::Jog(prepared) = self {
+                    prepared.place(depths, index);
                 }
             }
 

@@ -21,7 +21,7 @@ use crate::kinematics::Direction;
 use crate::math::{exp_negative, saturating_multiply, share, truncating_product};
 use crate::passivity::Elements;
 use crate::refusal::{Field, Refusal, count, milli, within};
-use crate::tissue::MAX_LAYERS;
+use crate::tissue::{MAX_LAYERS, Wall};
 use crate::units::{Damping, Millimetres, MillimetresPerSecond, Milliradians, Newtons, Stiffness};
 use crate::wall;
 use fixed::types::{I2F30, I8F24, I16F16};
@@ -127,6 +127,11 @@ impl Sparte {
     pub(crate) fn hold(&self) -> I16F16 {
         self.tracking.0.saturating_add(self.friction.stiffness.0)
     }
+}
+
+/// The wall that is pushed in, and the cutting that gives way to it.
+pub(super) fn steepest(pressed: Option<&Wall>) -> I16F16 {
+    pressed.map_or(I16F16::ZERO, wall::steepest_rise).saturating_mul_int(2)
 }
 
 impl PreparedSparte {

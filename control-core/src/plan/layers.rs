@@ -1,10 +1,10 @@
 //! From the layers of a patient to the anatomy and the forces that the tick runs.
 
 use super::stiffest;
-use crate::anatomy::{self, Anatomy};
+use crate::anatomy::{self, Anatomy, NeedleLine};
 use crate::config::{self, Config, Layer, MAX_LAYERS, Tissue, Vessel, Wall};
 use crate::law::LayerHit;
-use crate::refusal::{Field, Refusal, milli, within};
+use crate::refusal::{Field, Refusal, count, milli, within};
 use crate::units::Millimetres;
 use crate::wall::Parabola;
 use fixed::types::{I2F30, I16F16, U32F32};
@@ -12,6 +12,8 @@ use heapless::Vec;
 
 /// A force that appears at contact all at once is felt as a hit and rings: at most 0.05 N.
 const LARGEST_CONTACT_STEP: I16F16 = I16F16::from_bits(3_277);
+/// A change of the force by a line is at most 10 mN: this, and what rounding adds to it.
+const LINE_FORCE: I16F16 = I16F16::from_bits(645);
 /// A vessel that the needle would see less of is passed beside: 0.2 mm.
 const LEAST_LUMEN: I16F16 = I16F16::from_bits(13_107);
 
@@ -26,15 +28,19 @@ pub(super) struct Meeting {
 enum Way {
     /// Through the walls in these layers.
     Through { near: usize, far: Option<usize> },
-    /// Past it from this depth on, perpendicular to the skin.
-    Beside { depth: Millimetres },
+    /// Past it from this depth on, perpendicular to the skin, that of layer `number`.
+    Beside { depth: Millimetres, number: u8 },
 }
 
 /// Prepares what has been checked; `ruptures` has a bit for each layer that gives way by the law of
 /// force.
 pub(super) fn plan(config: &Config, met: &Meeting, ruptures: u8) -> Anatomy {
-    let mut anatomy =
-        Anatomy { vessel: None, skin_tilt: config.device.skin_tilt.0, layers: Vec::new(), walls: Vec::new() };
+    let mut anatomy = Anatomy {
+        skin_tilt: config.device.skin_tilt.0,
+        configured: config.patient.layers.len(),
+        line_steps: line_steps(config, met),
+        ..Anatomy::default()
+    };
     for (index, LayerHit { number, layer }) in met.layers.iter().enumerate() {
         // All vectors hold MAX_LAYERS: no push can fail.
         let _ = anatomy.layers.push(anatomy::Layer {
@@ -67,8 +73,57 @@ fn vessel(layers: &[anatomy::Layer], way: Way) -> Option<anatomy::Vessel> {
         Way::Through { near, far } => {
             anatomy::Vessel::Met { near: passage(near)?, far: far.and_then(passage) }
         }
-        Way::Beside { depth } => anatomy::Vessel::Beside { depth },
+        Way::Beside { depth, number } => anatomy::Vessel::Beside { depth, number },
     })
+}
+
+/// The way of a layer for which the force changes by 10 mN, less what rounding takes, once so many
+/// walls have given way; none where the force may jump.
+fn line_steps(config: &Config, met: &Meeting) -> Vec<I16F16, { MAX_LAYERS + 1 }> {
+    let walls: Vec<Wall, MAX_LAYERS> = met.layers.iter().filter_map(|met| met.layer.wall).collect();
+    let step = |given: usize| {
+        let (given, next) = walls.split_at_checked(given)?;
+        let steepest = config.patient.law.steepest(&met.layers, (given, next.first()))?;
+        Some(LINE_FORCE.saturating_div(steepest.max(I16F16::DELTA)))
+    };
+    (0..=walls.len()).map(|given| step(given).unwrap_or_default()).collect()
+}
+
+/// Refuses a line that meets the layers where no patient may have them, or where they ask for more
+/// than the motor gives.
+pub(super) fn check_line(plan: &super::Plan, line: &NeedleLine) -> Result<(), Refusal> {
+    let config = plan.config();
+    let layers = &config.patient.layers;
+    count(Field::LayerDepth, line.depths.len(), layers.len())?;
+    let mut above = None;
+    for (number, (&depth, layer)) in (0..).zip(line.depths.iter().zip(layers)) {
+        check_depth(config, number, &Layer { depth, ..*layer }, &mut above)?;
+    }
+    let moved = plan.anatomy.layers.iter().filter_map(|met| {
+        let number = usize::from(met.number);
+        let (layer, &depth) = layers.get(number).zip(line.depths.get(number))?;
+        Some(LayerHit { number: met.number, layer: Layer { depth, ..*layer } })
+    });
+    let moved: Vec<LayerHit, MAX_LAYERS> = moved.collect();
+    config.patient.law.check_depths(&super::force_limits(config, &moved))
+}
+
+/// Checks the depth of layer `number` below the one `above` it.
+fn check_depth(
+    config: &Config,
+    number: u8,
+    layer: &Layer,
+    above: &mut Option<Millimetres>,
+) -> Result<(), Refusal> {
+    within(Field::LayerDepth, layer.depth.0, I16F16::ZERO, milli(500_000))?;
+    if above.is_some_and(|above| above >= layer.depth) {
+        return Err(Refusal::Overlap { layer: number });
+    }
+    *above = Some(layer.depth);
+    if gives_way(layer) >= config.device.limits.travel.0 {
+        return Err(Refusal::BeyondTravel { layer: number });
+    }
+    Ok(())
 }
 
 fn check_layers(config: &Config) -> Result<(), Refusal> {
@@ -77,14 +132,7 @@ fn check_layers(config: &Config) -> Result<(), Refusal> {
     }
     let mut above = None;
     for (number, layer) in (0..).zip(&config.patient.layers) {
-        within(Field::LayerDepth, layer.depth.0, I16F16::ZERO, milli(500_000))?;
-        if above.is_some_and(|above| above >= layer.depth) {
-            return Err(Refusal::Overlap { layer: number });
-        }
-        above = Some(layer.depth);
-        if gives_way(layer) >= config.device.limits.travel.0 {
-            return Err(Refusal::BeyondTravel { layer: number });
-        }
+        check_depth(config, number, layer, &mut above)?;
         within(Field::Friction, layer.friction.0, I16F16::ZERO, milli(1_900))?;
         if let Some(wall) = &layer.wall {
             check_wall(wall, number, config)?;
@@ -137,7 +185,7 @@ pub(super) fn met(config: &Config) -> Result<Meeting, Refusal> {
     let lumen = height.saturating_mul(chord(&shape)?);
     if lumen < LEAST_LUMEN {
         met.retain(|met| !anatomy::is_vessel_wall(met.layer.tissue));
-        let way = Some(Way::Beside { depth: Millimetres(depth(near)) });
+        let way = Some(Way::Beside { depth: Millimetres(depth(near)), number: near as u8 });
         return Ok(Meeting { layers: met, way });
     }
     let lower = (height - lumen) / 2;

@@ -5,6 +5,7 @@ mod compensation;
 mod excitations;
 mod faults;
 mod laws;
+mod line;
 mod needle;
 mod orders;
 mod protections;

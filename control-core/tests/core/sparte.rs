@@ -50,7 +50,7 @@ fn layer(tissue: Tissue, depth: f64, wall: Option<Wall>) -> Layer {
 }
 
 /// A shoulder: the cutting forces of the paper's section IV, at a scale that the motor bears.
-fn shoulder() -> Config {
+pub(crate) fn shoulder() -> Config {
     use Tissue::{Bursa, Cartilage, Fat, Muscle, Skin, Tendon};
     let mut config = Config::commissioned_virtual();
     config.device.speed = SpeedMethod::EdgeTiming;

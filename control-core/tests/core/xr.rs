@@ -200,7 +200,7 @@ proptest! {
 
 /// Skin that gives way at 2 mm, a vessel at 4 mm that gives way at 5 mm; each a little deeper the
 /// faster the needle goes.
-fn that_gives_way() -> Config {
+pub(crate) fn that_gives_way() -> Config {
     let curve = [(0.0, 0.0), (2.0, 0.8), (2.3, 0.3), (4.0, 0.4), (5.0, 1.0), (5.3, 0.45), (15.0, 0.6)];
     let mut table = table(|_, _, _| 0.0);
     (table.depths, table.forces) = Default::default();

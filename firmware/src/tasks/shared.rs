@@ -1,5 +1,6 @@
 //! The single words that tasks share. Each has one writer, or is a set of bits.
 
+use super::latest_line::LatestLine;
 use crate::reset::LastWords;
 use crate::stage_timing::Stages;
 use crate::supervision::{Conditions, Reports, Trips};
@@ -23,6 +24,8 @@ pub struct Shared {
     /// The number of stops so far; the end of a session is one. No order from before the last of
     /// them gives torque. Written by telemetry, before it raises the stop in `trips`.
     pub stops: AtomicU32,
+    /// The latest line of the needle. Written by telemetry.
+    pub line: LatestLine,
     /// The number of orders that give torque which the tick has taken from the queue, modulo 2^32.
     /// Written by the tick, after what `powered` says of them.
     pub starts_taken: AtomicU32,
@@ -62,6 +65,7 @@ impl Shared {
             trips: Trips::new(),
             conditions: Conditions::new(),
             stops: AtomicU32::new(0),
+            line: LatestLine::new(),
             starts_taken: AtomicU32::new(0),
             stages: Stages::new(),
             supervised_ms: AtomicU32::new(0),

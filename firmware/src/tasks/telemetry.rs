@@ -150,6 +150,9 @@ impl<B: Board> Telemetry<B> {
                 break;
             }
         }
+        if let Some(line) = self.endpoint.take_line() {
+            self.shared.line.set(&line);
+        }
         B::allow_usb(true);
         self.forward_orders();
         self.guard_supply();

@@ -15,7 +15,7 @@ use control_core::{AnyOrder, Controller, LargeOrder, Order, Plan};
 use core::sync::atomic::Ordering::{Relaxed, Release};
 use link::frames::Stage;
 
-/// Ticks from one note of the motor's heat to the next.
+/// Ticks from one note of the motor's heat, or one line of the needle, to the next.
 const HEAT_TICKS: u32 = 8;
 
 /// The tick's own state.
@@ -34,6 +34,8 @@ pub struct Tick<B: Board> {
     entered: u32,
     supervised_ms: u32,
     unsupervised_ticks: u32,
+    /// The number of the line that was taken last.
+    line: u32,
     controller: Controller<&'static mut Segments>,
 }
 
@@ -62,6 +64,7 @@ impl<B: Board> Tick<B> {
             entered: 0,
             supervised_ms: 0,
             unsupervised_ticks: 0,
+            line: 0,
         }
     }
 
@@ -97,7 +100,12 @@ impl<B: Board> Tick<B> {
         self.tick = self.tick.wrapping_add(1);
         self.note_power(output.enable);
         if self.tick.is_multiple_of(HEAT_TICKS) {
-            self.shared.last_words.heat(self.controller.heat());
+            if self.line == self.shared.line.number() {
+                self.shared.last_words.heat(self.controller.heat());
+            } else if output.transitions.is_empty() {
+                // A tick in which a layer is touched or gives way is long enough.
+                self.take_line();
+            }
         }
         self.watch_supervisor();
         self.take_order();
@@ -118,6 +126,16 @@ impl<B: Board> Tick<B> {
         }
         if let Some(fault) = self.shared.trips.take() {
             self.controller.order(Order::Trip(fault));
+        }
+    }
+
+    /// Out of the way: most ticks bring none.
+    #[cold]
+    #[inline(never)]
+    fn take_line(&mut self) {
+        if let Some((number, depths, layers)) = self.shared.line.read() {
+            self.line = number;
+            self.controller.take_line(depths.get(..layers).unwrap_or_default());
         }
     }
 

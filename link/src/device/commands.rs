@@ -68,6 +68,10 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
         {
             return;
         }
+        if let Command::Line(line) = frame.command {
+            self.line_due = Some((frame.id, line));
+            return;
+        }
         let result = self.carry_out(frame.id, frame.command);
         let ack = Ack { id: frame.id, result };
         if result != Err(CommandRefusal::Full) {
@@ -144,8 +148,8 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
             Command::Index(index) => self.order(LargeOrder::Index(index.map(Counts))),
             Command::Segment { index, excitation } => self.upload(index, excitation),
             Command::Play { count, checksum } => self.play(count, checksum),
-            // Nothing to guard: a board would have deferred it.
-            Command::GuardSupply { .. } => Ok(()),
+            // Nothing to guard: a board would have deferred it. A line has gone its own way.
+            Command::GuardSupply { .. } | Command::Line(_) => Ok(()),
         }
     }
 
@@ -288,6 +292,7 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
     fn configure(&mut self, plan: Plan) -> Result<(), CommandRefusal> {
         self.order(LargeOrder::Configure(plan.clone()))?;
         self.plan = plan;
+        self.line_due = None;
         self.upload.forget();
         self.hello_due = true;
         Ok(())

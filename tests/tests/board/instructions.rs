@@ -40,14 +40,14 @@ pub(super) const BEGIN: Nanos = 200 * MILLISECOND;
 
 /// The instructions of each tick by what the tick was doing.
 #[derive(Default)]
-struct Profile {
+pub(super) struct Profile {
     by_state: BTreeMap<u8, Vec<u32>>,
 }
 
 impl Profile {
     /// Adds the ticks until `end` of a board with `config`, started by `begin`, whose needle the
     /// plant moves. `meddle` is called every millisecond.
-    fn add(
+    pub(super) fn add(
         &mut self,
         config: Config,
         begin: &[Command],
@@ -80,7 +80,7 @@ impl Profile {
     }
 
     /// Prints median and longest of each state, and answers the longest of all.
-    fn longest(&mut self, what: &str) -> u32 {
+    pub(super) fn longest(&mut self, what: &str) -> u32 {
         for (&state, instructions) in &mut self.by_state {
             instructions.sort_unstable();
             let name =

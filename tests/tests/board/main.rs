@@ -12,6 +12,7 @@ mod fitted;
 mod holding;
 mod instructions;
 mod lamps;
+mod line;
 mod log;
 mod option_bytes;
 mod own_test;

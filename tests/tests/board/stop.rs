@@ -1,6 +1,7 @@
 //! A stop that is answered holds: random streams of commands at random phases on the flash image,
 //! judged by what was sent, what was answered and when the enable line changed.
 
+use super::line::line;
 use control_core::compensation::Gains;
 use control_core::event::Fault;
 use control_core::excitation::{Excitation, Servo, Signal};
@@ -85,11 +86,17 @@ fn kind(command: &Command) -> Kind {
     }
 }
 
+/// A line for the default patient or for the phantom, sound or not.
+fn needle_line(random: &mut Random) -> Command {
+    let layers = [4, 6][random.below(2) as usize];
+    line((0..layers).map(|layer| 5.0 * f64::from(layer) + random.below(7_000) as f64 / 1_000.0))
+}
+
 /// One or more commands that a PC sends without waiting.
 fn commands(random: &mut Random, rig: &Rig) -> Vec<Command> {
     let mut phantom = laws::phantom();
     phantom.device.limits.fade_in_ms = 100 + random.below(400) as u16;
-    vec![match random.below(20) {
+    vec![match random.below(22) {
         0..=4 => Command::Stop,
         5..=7 => Command::Start,
         8 => return vec![Command::Start, rig.pc.record_of(phantom.device)],
@@ -102,6 +109,9 @@ fn commands(random: &mut Random, rig: &Rig) -> Vec<Command> {
         16 => return sequence(&[stroke(), stroke()]),
         17 => Command::Compensate(Gains::default()),
         18 => Command::Index(Some(random.below(4_000) as i32)),
+        19 => needle_line(random),
+        // More than are taken.
+        20 => return (0..random.below(40)).map(|_| needle_line(random)).collect(),
         _ => [Command::ReportDevice, Command::Commission, Command::Hello { version: PROTOCOL_VERSION }]
             [random.below(3) as usize]
             .clone(),

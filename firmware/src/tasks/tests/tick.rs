@@ -6,8 +6,10 @@ use crate::timing;
 use control_core::config::DacWidth;
 use control_core::event::Fault;
 use control_core::interlock::Interlock;
-use control_core::{Device, LargeOrder, Order, Patient, Plan};
+use control_core::units::Millimetres;
+use control_core::{Device, LargeOrder, NeedleLine, Order, Patient, Plan};
 use core::sync::atomic::Ordering::Relaxed;
+use fixed::types::I16F16;
 use std::vec::Vec;
 
 /// As telemetry passes on the plan of a device with the converter of 8 bits.
@@ -36,6 +38,41 @@ fn no_start_from_before_a_stop_gives_torque() {
     run(&mut tick, shared, 1);
     assert!(!world().enabled.get() && !shared.is_powered(), "a stop waits behind nothing");
     assert_eq!(world().codes.borrow().last(), Some(&2048));
+}
+
+/// The skin of the default patient, at depth 0, is 3 mm deep for the needle's line.
+#[test]
+fn the_tick_takes_the_latest_line() {
+    let contact = |lines: &[i32]| {
+        let (mut tick, shared, mut telemetry) = tick();
+        for skin in lines {
+            let depths = (0..4).map(|layer| Millimetres(I16F16::from_num(skin + 3 * layer)));
+            shared.line.set(&NeedleLine { depths: depths.collect() });
+        }
+        world().count.set(-100);
+        run(&mut tick, shared, 100);
+        world().count.set(100);
+        run(&mut tick, shared, 10);
+        let outputs = core::iter::from_fn(|| telemetry.outputs.dequeue());
+        outputs.fold(0, |all, ticked: Ticked| all | ticked.output.transitions.contact)
+    };
+    assert_eq!(contact(&[]) & 1, 1);
+    assert_eq!(contact(&[0, 3]), 0);
+    assert_eq!(contact(&[3, 0]) & 1, 1);
+}
+
+#[test]
+fn a_line_that_is_half_written_is_not_read() {
+    let (_, shared, _) = tick();
+    let depth = Millimetres(I16F16::ONE);
+    let line = NeedleLine { depths: core::iter::once(depth).collect() };
+    let is_read = || shared.line.read().is_some_and(|(_, depths, layers)| (depths[0], layers) == (depth, 1));
+    shared.line.set(&line);
+    assert!(is_read());
+    shared.line.begin();
+    assert_eq!(shared.line.read(), None);
+    shared.line.set(&line);
+    assert!(is_read());
 }
 
 #[test]

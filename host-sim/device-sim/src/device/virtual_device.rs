@@ -178,6 +178,9 @@ impl VirtualDevice {
 
     /// One tick of the control law, then 100 µs of physics.
     pub fn tick(&mut self) {
+        if let Some(line) = self.endpoint.take_line() {
+            self.controller.take_line(&line.depths);
+        }
         while let Some(order) = self.endpoint.next_order() {
             self.order(order);
         }
