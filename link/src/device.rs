@@ -225,9 +225,9 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
         core::mem::take(&mut self.stop_due)
     }
 
-    /// Returns the latest line once, if it is sound, and answers it; those that it has overtaken are
-    /// not answered. It overtakes the orders too: whoever passes them on to the control law gives it
-    /// this first. It is checked here, so that many of them hold nothing up.
+    /// Returns the latest line once, if it is sound, and answers it; those that it has overtaken
+    /// are not answered. It overtakes the orders too: whoever passes them on to the control law
+    /// gives it this first. It is checked here, so that many of them hold nothing up.
     pub fn take_line(&mut self) -> Option<NeedleLine> {
         let (id, line) = self.line_due.take()?;
         let result = self.plan.check_line(&line).map_err(CommandRefusal::Config);

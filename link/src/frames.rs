@@ -401,12 +401,11 @@ pub enum Command {
         /// True to set it.
         set: bool,
     },
-    /// Where a needle that has turned in tissue meets the layers, torque on or off; taken whole or
+    /// The layers along a needle that has turned in tissue, torque on or off; taken whole or
     /// refused with the reason. The latest counts, waits behind no order, and is the one that is
-    /// answered. It changes the force
-    /// on a needle at rest by at most 10 mN, touches no layer and lets no wall give way: what it
-    /// leaves to do, the next one or the needle's own movement does. Send it 50 to 70 times a
-    /// second while the needle turns. It holds until the zero, an excitation or another
-    /// configuration.
+    /// answered. It changes the force on a needle at rest by at most 10 mN, touches no layer and
+    /// lets no wall give way: what it leaves to do, the next one or the needle's own movement does.
+    /// Send it 50 to 70 times a second while the needle turns. It holds until the zero, an
+    /// excitation or another configuration.
     Line(NeedleLine),
 }

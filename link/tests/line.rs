@@ -1,5 +1,5 @@
-//! The line of a needle on its way: the latest counts, an unsound one leaves everything as it was, and
-//! no number of them pushes anything out.
+//! The line of a needle on its way: the latest counts, an unsound one leaves everything as it was,
+//! and no number of them pushes anything out.
 
 use control_core::config::Config;
 use control_core::units::Millimetres;

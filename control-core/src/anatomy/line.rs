@@ -1,12 +1,12 @@
-//! The line of a needle that has turned in tissue: whoever models the tissue says where it meets the
-//! layers, and they go there without a jump of the force.
+//! The line of a needle that has turned in tissue: whoever models the tissue says where it meets
+//! the layers, and they go there without a jump of the force.
 //!
 //! A line makes no event. What the tip has not touched lies where the line says, but not above the
 //! tip; what it has touched goes there in steps, one for each line, of at most
 //! [`Anatomy::line_steps`], neither past the tip nor so far that a wall gives way. The needle's own
 //! movement does what is then left to do. So a needle at rest feels a change of at most 10 mN for
-//! each line. A layer takes three ticks, 0.5 ms apart, so that no tick is longer than others: a line
-//! of six layers takes 12 ms.
+//! each line. A layer takes three ticks, 0.5 ms apart, so that no tick is longer than others: a
+//! line of six layers takes 12 ms.
 
 use super::turning::Turning;
 use super::{Anatomy, Insertion, Vessel};
@@ -16,7 +16,7 @@ use fixed::types::I16F16;
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
-/// Where a needle meets the layers after it has turned in tissue.
+/// The line of a needle that has turned in tissue.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct NeedleLine {
     /// One for each layer of the patient, outermost first: the length along the needle from the

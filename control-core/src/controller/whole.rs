@@ -71,8 +71,9 @@ impl<S: BorrowMut<Segments>> Controller<S> {
     }
 
     /// Takes [`crate::NeedleLine::depths`] of a needle that has turned in tissue, in the place of
-    /// those before; they have passed [`Plan::check_line`]. It holds until the next, or until the needle is taken for one
-    /// that has never been in this tissue: at a zero, an excitation, another plan.
+    /// those before; they have passed [`Plan::check_line`]. It holds until the next, or until the
+    /// needle is taken for one that has never been in this tissue: at a zero, an excitation,
+    /// another plan.
     #[inline]
     pub fn take_line(&mut self, depths: &[Millimetres]) {
         self.core.take_line(depths);

@@ -1,5 +1,5 @@
-//! The line of a needle that has turned in tissue: the layers go where it meets them, without a jump
-//! of the force, without an event, and under the same limits as a patient.
+//! The line of a needle that has turned in tissue: the layers go where it meets them, without a
+//! jump of the force, without an event, and under the same limits as a patient.
 
 use crate::needle::{Needle, force};
 use crate::refusals::q;
@@ -207,7 +207,7 @@ fn a_layer_is_met_where_the_line_says() {
     }
 }
 
-/// What a needle has touched goes to its place by 10 mN a line, and stays there.
+/// A layer that the tip has touched goes to its place by 10 mN a line, and stays there.
 #[test]
 fn a_wall_under_the_tip_arrives_after_enough_lines() {
     let mut needle = Needle::new(&Config::commissioned_virtual(), STRAIGHT);
@@ -227,7 +227,8 @@ fn a_wall_under_the_tip_arrives_after_enough_lines() {
     assert!((force(&needle.rest(0.5)) - 1.0 / 9.0).abs() < 0.002, "without another line it stays");
 }
 
-/// The line would carry the vein's wall past the tip, or the tip through it: the next movement does.
+/// The line would carry the vein's wall past the tip, or the tip through it: the next movement
+/// does.
 #[test]
 fn what_a_line_would_do_the_needle_does() {
     let mut needle = Needle::new(&Config::commissioned_virtual(), STRAIGHT);

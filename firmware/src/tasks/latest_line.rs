@@ -1,5 +1,5 @@
-//! The latest line of the needle on its way from telemetry to the tick: outside the queue of orders,
-//! and without a lock.
+//! The latest line of the needle on its way from telemetry to the tick: outside the queue of
+//! orders, and without a lock.
 
 use control_core::NeedleLine;
 use control_core::config::MAX_LAYERS;
@@ -7,8 +7,8 @@ use control_core::units::Millimetres;
 use core::sync::atomic::{AtomicI32, AtomicU32, AtomicUsize, Ordering::Relaxed, Ordering::SeqCst};
 use fixed::types::I16F16;
 
-/// Written by telemetry, read by the tick, which interrupts it and finds a line that is half written
-/// in the next tick.
+/// Written by telemetry, read by the tick, which interrupts it and finds a line that is half
+/// written in the next tick.
 pub struct LatestLine {
     /// The number of the line, doubled; odd while it is being written. 0: none yet.
     number: AtomicU32,

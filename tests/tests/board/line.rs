@@ -1,5 +1,5 @@
-//! The line of a needle that has turned in tissue, on the flash image: what it does at the converter,
-//! what the device answers, and what it costs the tick.
+//! The line of a needle that has turned in tissue, on the flash image: what it does at the
+//! converter, what the device answers, and what it costs the tick.
 
 use super::instructions::{BEGIN, Profile};
 use control_core::units::Millimetres;
@@ -42,8 +42,8 @@ fn codes(rig: &mut Rig, from: Nanos, to: Nanos) -> (u16, u16) {
     })
 }
 
-/// A needle that rests in skin that it presses, with its torque faded in, at an odd count: the lines
-/// of its encoder differ, so that the device does not ask it for a count.
+/// A needle that rests in skin that it presses, with its torque faded in, at an odd count: the
+/// lines of its encoder differ, so that the device does not ask it for a count.
 fn resting() -> Rig {
     let hand = plant::path(vec![(400 * MILLISECOND, 0), (700 * MILLISECOND, PRESSED | 1)]);
     let mut rig = Rig::connected(Wiring::default(), hand);
