@@ -170,7 +170,7 @@ fn gate(metrics: &metrics::Metrics) -> Result<(), String> {
             metrics.failures
         ));
     }
-    // Wanted is one in a hundred: two of eight is no luck.
+    // Wanted is one in a hundred: two of four is no luck.
     if metrics.null_alarms.hits > 1 {
         return Err(format!(
             "the tool named physics in {} of {} nulls; the misses above list them",
@@ -234,8 +234,8 @@ mod tests {
         assert_eq!(gate(&good), Ok(()));
         let poor = Metrics { strong: Rate { hits: 17, trials: 25 }, ..Metrics::default() };
         assert!(gate(&poor).unwrap_err().contains("17 of 25"));
-        let alarm = Metrics { null_alarms: Rate { hits: 2, trials: 8 }, ..good.clone() };
-        assert!(gate(&alarm).unwrap_err().contains("2 of 8 nulls"));
+        let alarm = Metrics { null_alarms: Rate { hits: 2, trials: 4 }, ..good.clone() };
+        assert!(gate(&alarm).unwrap_err().contains("2 of 4 nulls"));
         let silent = Metrics { failures: 2, ..good };
         assert!(gate(&silent).unwrap_err().contains("no report in 2"));
     }

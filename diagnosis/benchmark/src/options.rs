@@ -107,7 +107,7 @@ pub const HELP: &str = "prove: the blinded benchmark of the diagnosis
 
   --seed N      seed of every draw (1)
   --cases K     draws of every effect at every strength (2); pairs, nulls and the rest in proportion
-  --quick       the small fixed run: one draw of every effect at the strongest, a sample of the rest
+  --quick       the small fixed run: one draw of every second effect at the strongest, a sample of the rest
   --settle      conceal --cases K plants (20) in the virtual device and let `host-sim settle` name them, beside random multisines,
                 the set of characterise and strokes as in practice in the same time of motion; settle.json and settle.md in the folder of --out.
                 --keep DIR leaves the recordings. A run of the same seed, inputs and programs that was stopped goes on; with --only,
