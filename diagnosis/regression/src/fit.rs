@@ -1,5 +1,5 @@
 //! Weighted least squares on the fit recordings, with one fold left out at a time, and the same
-//! model read on the hold-out.
+//! model read on the holdout.
 
 use crate::constants::FOLDS;
 use crate::problem::{Candidate, Problem};
@@ -108,8 +108,8 @@ impl<'a> Model<'a> {
         solve(self.problem, &[&self.columns, &more], &self.y, &joined)
     }
 
-    /// Reads a model on the hold-out: values of the fit, offsets and phases of its own. `laws` are
-    /// all laws of `fitted`. Returns the weighted residuals of the hold-out's rows, and for the
+    /// Reads a model on the holdout: values of the fit, offsets and phases of its own. `laws` are
+    /// all laws of `fitted`. Returns the weighted residuals of the holdout's rows, and for the
     /// last law the agreement of its size there with that of the fit.
     pub(crate) fn hold_out(&self, laws: &[&Candidate], fitted: &Fitted) -> (Vec<f64>, f64) {
         let p = self.problem;
@@ -178,7 +178,7 @@ impl<'a> Model<'a> {
         last
     }
 
-    /// The agreement of the mean offset of the hold-out with that of the fit, over the larger.
+    /// The agreement of the mean offset of the holdout with that of the fit, over the larger.
     pub(crate) fn offsets_agree(&self) -> f64 {
         let p = self.problem;
         let mean = |x: Vec<f64>| x.iter().sum::<f64>() / x.len().max(1) as f64;
@@ -190,7 +190,7 @@ impl<'a> Model<'a> {
         fit * there / (fit * fit).max(there * there).max(1e-300)
     }
 
-    /// Values of a fit to the hold-out alone: nominal terms, `offsets`, laws.
+    /// Values of a fit to the holdout alone: nominal terms, `offsets`, laws.
     fn alone(&self, laws: &[&Candidate], offsets: &[Vec<f64>]) -> Vec<f64> {
         let p = self.problem;
         let (first, end) = (p.tiling.fit_rows, p.tiling.rows.len());
@@ -206,7 +206,7 @@ impl<'a> Model<'a> {
         Factor::new(&sums.left).solve(&sums.right)
     }
 
-    /// The agreement of the last law's force with that of a fit to the hold-out alone.
+    /// The agreement of the last law's force with that of a fit to the holdout alone.
     fn held_out_size(&self, laws: &[&Candidate], law: &Candidate, values: &[f64]) -> f64 {
         let p = self.problem;
         let held = if self.with_offsets { p.fit_recordings..p.recordings } else { 0..0 };

@@ -1,4 +1,4 @@
-//! Laws concealed in a simulated axis are proposed first, and the hold-out has no part in the
+//! Laws concealed in a simulated axis are proposed first, and the holdout has no part in the
 //! choice. The axis is stepped at 20 kHz by a method of its own.
 
 use regression::{Part, Proposals, Recording, Rig, Value, propose};
@@ -12,7 +12,7 @@ const COUNTS: f64 = 40_000.0 / TAU;
 const LOG_HZ: usize = 1000;
 const STEPS: usize = 20;
 
-/// What is concealed: a force of (q, v, t, drive force), a map of the command history, and a
+/// The concealed physics: a force of (q, v, t, drive force), a map of the command history, and a
 /// change of the reading, and what the reading loses at a speed every 0.4 s.
 struct Hidden {
     force: fn(f64, f64, f64, f64) -> f64,
@@ -108,12 +108,12 @@ fn is_first(name: &str, rig: &Rig, hidden: &Hidden) {
     let shown: Vec<_> =
         found.rounds[0].iter().take(4).map(|h| (h.law.name, h.evidence.share, h.valid)).collect();
     assert_eq!(first.law.name, name, "{shown:?}");
-    let held = first.evidence.held_out.expect("the first law is read on the hold-out");
+    let held = first.evidence.held_out.expect("the first law is read on the holdout");
     assert!(first.valid && first.evidence.share > 0.05 && held.share > 0.05, "{shown:?} {held:?}");
 }
 
 #[test]
-fn nothing_is_proposed_with_a_material_share_where_nothing_is_missing() {
+fn nothing_material_is_proposed_where_nothing_is_missing() {
     let found = proposals(&rig(), &NONE);
     let largest = found.rounds.iter().map(|round| round[0].evidence.share).fold(0.0, f64::max);
     assert!(largest < 0.1, "{largest}");
@@ -196,7 +196,7 @@ fn a_scrambled_hold_out_changes_no_proposal() {
     let force = |q: f64, v: f64, _: f64, _: f64| 2e-4 * (7.0 * q).sin() - 6e-7 * v * v.abs();
     let mut all = recordings(&Hidden { force, ..NONE });
     let before = propose(&rig(), &all).expect("recordings are long enough");
-    let held = all.last_mut().expect("the hold-out");
+    let held = all.last_mut().expect("the holdout");
     held.command.reverse();
     held.command.rotate_left(777);
     held.position_counts.reverse();
@@ -205,5 +205,5 @@ fn a_scrambled_hold_out_changes_no_proposal() {
     assert!(order(&before).len() > 20);
     assert_eq!(order(&before), order(&after));
     let held = |p: &Proposals| p.rounds[0][0].evidence.held_out.expect("read").share;
-    assert!(held(&before) > held(&after) + 0.1, "the hold-out judges: {} {}", held(&before), held(&after));
+    assert!(held(&before) > held(&after) + 0.1, "the holdout judges: {} {}", held(&before), held(&after));
 }

@@ -135,7 +135,8 @@ fn jumps(s: &Signals, rig: &Rig) -> Vec<f64> {
     for i in 0..n {
         let near = i.saturating_sub(3 * w)..(i + 3 * w + 1).min(n);
         let against = steps[i].abs() > least && steps[i] * s.v[i] < 0.0;
-        // Beside a step, where it falls between two outer windows, the difference has the other sign.
+        // Beside a step, where it falls between two outer windows, the difference has the other
+        // sign.
         let smaller = |k: usize| {
             let (other, this) = (steps[k] * steps[i].signum(), steps[i].abs());
             other < this || (k >= i && other == this)
