@@ -6,12 +6,13 @@
 //! were not used for fitting, and reports. This crate knows rigs and recordings; it may not know
 //! devices, links or plots of other crates.
 //!
-//! Folders, each using only those before it: `effects` (the laws), `io` (rigs, recordings, the report's shape), `simulation` (a rig run
-//! forward), `data_faults` (faults of the logs), `estimation` (blocks, filter, noise, fit),
-//! `selection` (candidates and their shapes), `validation` (held-out recordings), `pipeline` (the
-//! stages, one after another) and `report` (sentences, pages and files).
-//! `tests/behaviour/layout.rs` checks this, and that no files use each other in a circle. The
-//! numbers that admit or reject a name are in `thresholds`, which every folder may read.
+//! Folders, each using only those before it: `effects` (the laws), `io` (rigs, recordings, the
+//! report's shape), `simulation` (a rig run forward), `data_faults` (faults of the logs),
+//! `estimation` (blocks, filter, noise, fit), `selection` (candidates and their shapes),
+//! `validation` (held-out recordings), `pipeline` (the stages, one after another) and `report`
+//! (sentences, pages and files). `tests/behaviour/layout.rs` checks this, and that no files use
+//! each other in a circle. The numbers that admit or reject a name are in `thresholds`, which every
+//! folder may read.
 
 // Matrices are read by row and column.
 #![allow(clippy::needless_range_loop)]

@@ -40,7 +40,7 @@ const POOR: [(&str, &[Kind]); 10] = [
 pub(crate) struct Amounts {
     /// Draws of each effect at each strength.
     pub(crate) singles: usize,
-    /// Of the effects, one of so many.
+    /// One effect of so many is drawn.
     pub(crate) every: usize,
     pub(crate) strengths: usize,
     pub(crate) pairs: usize,

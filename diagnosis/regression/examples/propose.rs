@@ -8,7 +8,7 @@ use regression::{Hypothesis, Part, Proposals, Recording, Rig, Value};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
-/// The prototype's rule C0: least share and z on left-out frames and on the hold-out, least
+/// The prototype's rule C0: least share and z on left-out frames and on the holdout, least
 /// agreement of sizes, and what makes a rival a member of the class.
 const SHARE: f64 = 0.15;
 const Z: f64 = 1.0;
@@ -53,7 +53,7 @@ fn read(path: &Path, part: Part) -> Result<Recording, String> {
     })
 }
 
-/// The smaller of a figure on left-out frames and on the hold-out.
+/// The smaller of a figure on left-out frames and on the holdout.
 fn both(fit: f64, held: impl Fn(regression::HeldOut) -> f64, h: &Hypothesis) -> f64 {
     h.evidence.held_out.map_or(f64::NEG_INFINITY, |out| fit.min(held(out)))
 }

@@ -1,4 +1,4 @@
-//! What the regression is given: plain data, without files.
+//! The regression's input: plain data, without files.
 
 /// A nominal value and how far it may be off.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -42,7 +42,7 @@ pub struct Rig {
     pub start_spread: Option<f64>,
 }
 
-/// What a recording may be used for.
+/// The use that a recording is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Part {
     /// To choose and to fit.
@@ -54,7 +54,7 @@ pub enum Part {
 /// One recording; all columns are as long as `time_s`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recording {
-    /// What it may be used for.
+    /// The use that it is for.
     pub part: Part,
     /// Strictly increasing, s.
     pub time_s: Vec<f64>,

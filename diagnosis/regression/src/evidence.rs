@@ -8,38 +8,41 @@ use numerics::linear::dot;
 /// these are fourteen numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Evidence {
-    /// Part of the weighted force error that the law takes on left-out frames of the fit: 1 − √(after/before).
+    /// Part of the weighted force error that the law takes on left-out frames of the fit: 1 −
+    /// √(after/before).
     pub share: f64,
     /// Mean over standard error of what the law takes, frame by frame.
     pub z: f64,
-    /// Agreement of the law's force from two halves of the fit; 1 if they are equal, 0.4 if one is 2.5
-    /// times the other.
+    /// Agreement of the law's force from two halves of the fit; 1 if they are equal, 0.4 if one is
+    /// 2.5 times the other.
     pub size_agreement: f64,
-    /// Standard errors by which the law is ahead of the next one; negative: behind the round's first.
+    /// Standard errors by which the law is ahead of the next one; negative: behind the round's
+    /// first.
     pub lead_z: f64,
-    /// What smooth functions of speed, travel, time and travel since reversal take beyond the law, as a
-    /// share.
+    /// The share that smooth functions of speed, travel, time and travel since reversal take beyond
+    /// the law.
     pub free_form_more: f64,
     /// Force error after the law over the noise that readings alone would leave.
     pub residual_over_noise: f64,
     /// Rows of the fit, one degree of freedom each.
     pub rows: f64,
-    /// The same on the hold-out, with values of the fit; for the chosen law and its printed rivals.
+    /// The same on the holdout, with values of the fit; for the chosen law and its printed rivals.
     pub held_out: Option<HeldOut>,
 }
 
-/// What the hold-out says, read once.
+/// The figures of the holdout, read once.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HeldOut {
     /// As [`Evidence::share`].
     pub share: f64,
     /// As [`Evidence::z`].
     pub z: f64,
-    /// Agreement of the law's size with that fitted to the hold-out alone.
+    /// Agreement of the law's size with that fitted to the holdout alone.
     pub size_agreement: f64,
 }
 
-/// Share, and gain by frame as half a logarithm, of residuals `after` against `before`; `first` is the first row's number.
+/// Share, and gain by frame as half a logarithm, of residuals `after` against `before`; `first` is
+/// the first row's number.
 pub(crate) fn compare(p: &Problem, before: &[f64], after: &[f64], first: usize) -> (f64, Vec<f64>) {
     let share = 1.0 - (dot(after, after) / (dot(before, before) + 1e-300)).sqrt();
     let rows = &p.tiling.rows[first..first + before.len()];

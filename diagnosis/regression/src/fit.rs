@@ -1,5 +1,5 @@
 //! Weighted least squares on the fit recordings, with one fold left out at a time, and the same
-//! model read on the hold-out.
+//! model read on the holdout.
 
 use crate::constants::FOLDS;
 use crate::problem::{Candidate, Problem};
@@ -108,8 +108,8 @@ impl<'a> Model<'a> {
         solve(self.problem, &[&self.columns, &more], &self.y, &joined)
     }
 
-    /// Reads a model on the hold-out: values of the fit, offsets and phases of its own. `laws` are
-    /// all laws of `fitted`. Returns the weighted residuals of the hold-out's rows, and for the
+    /// Reads a model on the holdout: values of the fit, offsets and phases of its own. `laws` are
+    /// all laws of `fitted`. Returns the weighted residuals of the holdout's rows, and for the
     /// last law the agreement of its size there with that of the fit.
     pub(crate) fn hold_out(&self, laws: &[&Candidate], fitted: &Fitted) -> (Vec<f64>, f64) {
         let p = self.problem;
@@ -178,7 +178,7 @@ impl<'a> Model<'a> {
         last
     }
 
-    /// The agreement of the mean offset of the hold-out with that of the fit, over the larger.
+    /// The agreement of the mean offset of the holdout with that of the fit, over the larger.
     pub(crate) fn offsets_agree(&self) -> f64 {
         let p = self.problem;
         let mean = |x: Vec<f64>| x.iter().sum::<f64>() / x.len().max(1) as f64;
@@ -190,7 +190,7 @@ impl<'a> Model<'a> {
         fit * there / (fit * fit).max(there * there).max(1e-300)
     }
 
-    /// Values of a fit to the hold-out alone: nominal terms, `offsets`, laws.
+    /// Values of a fit to the holdout alone: nominal terms, `offsets`, laws.
     fn alone(&self, laws: &[&Candidate], offsets: &[Vec<f64>]) -> Vec<f64> {
         let p = self.problem;
         let (first, end) = (p.tiling.fit_rows, p.tiling.rows.len());
@@ -206,7 +206,7 @@ impl<'a> Model<'a> {
         Factor::new(&sums.left).solve(&sums.right)
     }
 
-    /// The agreement of the last law's force with that of a fit to the hold-out alone.
+    /// The agreement of the last law's force with that of a fit to the holdout alone.
     fn held_out_size(&self, laws: &[&Candidate], law: &Candidate, values: &[f64]) -> f64 {
         let p = self.problem;
         let held = if self.with_offsets { p.fit_recordings..p.recordings } else { 0..0 };
@@ -384,91 +384,4 @@ fn noise(p: &Problem, model: &Model, least: f64) -> (f64, f64) {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::data::{Part, Recording, Rig, Value};
-
-    fn problem() -> Problem {
-        let value = |nominal| Value { nominal, spread: Some(0.3) };
-        let rig = Rig {
-            rotary: true,
-            inertia: value(1.0),
-            viscous: Some(value(0.5)),
-            coulomb: Some(value(2.0)),
-            weight: None,
-            gravity: None,
-            has_offset: true,
-            gain: value(1.0),
-            known_delay_s: 0.0,
-            counts_per_unit: 1e4,
-            absolute: true,
-            noise_counts: 0.0,
-            turn: None,
-            start_spread: None,
-        };
-        let recording = |part, phase: f64| {
-            let time_s: Vec<f64> = (0..3000).map(|i| f64::from(i) * 0.01).collect();
-            let q = |t: f64| (1.3 * t + phase).sin() + 0.2 * (7.0 * t).sin();
-            let u = |t: f64| (2.0 * t).cos() + (9.0 * t + phase).sin();
-            let counts = time_s.iter().map(|t| (1e4 * q(*t)).round()).collect();
-            let command = time_s.iter().map(|t| u(*t)).collect();
-            Recording { part, time_s, command, position_counts: counts, tilt_rad: None, load: None }
-        };
-        let all = [recording(Part::Fit, 0.0), recording(Part::Fit, 1.0), recording(Part::Holdout, 2.0)];
-        Problem::new(&rig, &all.iter().collect::<Vec<_>>())
-    }
-
-    /// Least squares by modified Gram–Schmidt on rows, those of the prior appended; no normal
-    /// equations.
-    fn by_orthogonal_columns(mut columns: Vec<Vec<f64>>, mut y: Vec<f64>) -> Vec<f64> {
-        let n = columns.len();
-        let mut r = vec![vec![0.0; n]; n];
-        let mut c = vec![0.0; n];
-        for i in 0..n {
-            r[i][i] = dot(&columns[i], &columns[i]).sqrt();
-            let unit: Vec<f64> = columns[i].iter().map(|x| x / r[i][i]).collect();
-            for j in i + 1..n {
-                r[i][j] = dot(&unit, &columns[j]);
-                columns[j].iter_mut().zip(&unit).for_each(|(x, u)| *x -= r[i][j] * u);
-            }
-            c[i] = dot(&unit, &y);
-            y.iter_mut().zip(&unit).for_each(|(x, u)| *x -= c[i] * u);
-        }
-        let mut x = vec![0.0; n];
-        for i in (0..n).rev() {
-            x[i] = (c[i] - (i + 1..n).map(|j| r[i][j] * x[j]).sum::<f64>()) / r[i][i];
-        }
-        x
-    }
-
-    #[test]
-    fn weighted_least_squares_agrees_with_orthogonal_columns() {
-        let p = problem();
-        let model = Model::new(&p, Vec::new());
-        let fit = p.tiling.fit_rows;
-        let facts = (fit as f64 / p.tiling.fit_frames as f64).sqrt();
-        let solve = |keep: &dyn Fn(usize) -> bool| {
-            let rows = || (0..fit).filter(|k| keep(p.tiling.rows[*k].fold));
-            let weigh = |c: &[f64]| rows().map(|k| c[k] * model.root[k]).collect::<Vec<f64>>();
-            let mut columns: Vec<Vec<f64>> = p.nominal.iter().map(|n| weigh(&n.column)).collect();
-            columns.extend((0..2).map(|i| weigh(&only(&p, &p.one, i))));
-            let mut y = weigh(&p.y);
-            for (i, n) in p.nominal.iter().enumerate() {
-                let root = facts / n.variance.sqrt();
-                columns.iter_mut().enumerate().for_each(|(j, c)| c.push(if i == j { root } else { 0.0 }));
-                y.push(root * n.mean);
-            }
-            by_orthogonal_columns(columns, y)
-        };
-        let expected = solve(&|_| true);
-        for (value, expected) in model.fitted.values.iter().zip(&expected) {
-            assert!((value - expected).abs() < 1e-5 * (1.0 + expected.abs()), "{value} {expected}");
-        }
-        let without = solve(&|fold| fold != 1);
-        let row = (0..fit).find(|k| p.tiling.rows[*k].fold == 1).expect("a row of fold 1");
-        let terms = p.nominal.iter().zip(&without).map(|(n, v)| v * n.column[row]).sum::<f64>();
-        let left =
-            model.root[row] * (p.y[row] - terms - without[3 + p.tiling.rows[row].recording] * p.one[row]);
-        assert!((left - model.fitted.error[row]).abs() < 1e-5 * (1.0 + left.abs()), "{left}");
-    }
-}
+mod tests;

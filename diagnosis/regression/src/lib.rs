@@ -2,7 +2,7 @@
 //!
 //! [`propose`] is a pure function: a [`Rig`] (the nominal simulation and how far its values may be
 //! off) and [`Recording`]s in, [`Proposals`] out. Chosen on left-out frames of the fit recordings
-//! alone; the hold-out is read once, after everything is chosen, for the final laws and their
+//! alone; the holdout is read once, after everything is chosen, for the final laws and their
 //! printed rivals.
 //!
 //! Signals on an even grid (`grid`, `signals`) and columns of laws (`laws`) pass one mask, one
@@ -39,7 +39,7 @@ pub struct Hypothesis {
     pub coefficients: Vec<f64>,
     /// True if the first coefficient has the sign and unit of the law, and two halves agree.
     pub valid: bool,
-    /// What speaks for it.
+    /// The figures for and against it.
     pub evidence: Evidence,
 }
 
@@ -48,7 +48,7 @@ pub struct Hypothesis {
 pub struct ForceError {
     /// On left-out frames of the fit.
     pub fit: f64,
-    /// On the hold-out.
+    /// On the holdout.
     pub holdout: f64,
 }
 
@@ -67,7 +67,7 @@ pub struct Proposals {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Refusal(pub String);
 
-/// Fewest rows of a recording, and of the transformed fit and hold-out.
+/// Fewest rows of a recording, and of the transformed fit and holdout.
 const FEWEST: (usize, usize, usize) = (60, 60, 40);
 
 /// Proposes laws that the rig leaves out. Recordings of fewer than 60 rows are left aside.

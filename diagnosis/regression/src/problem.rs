@@ -13,7 +13,7 @@ use std::f64::consts::TAU;
 pub(crate) struct Candidate {
     pub(crate) law: &'static Law,
     pub(crate) shapes: Vec<Shape>,
-    /// Of all rows, those of the fit first.
+    /// One value a row, rows of the fit first.
     pub(crate) columns: Vec<Vec<f64>>,
     /// True if each recording has coefficients of its own.
     pub(crate) own_phase: bool,
@@ -38,7 +38,8 @@ pub(crate) struct Problem {
     pub(crate) nominal: Vec<Nominal>,
     /// A force of one where the axis moves.
     pub(crate) one: Vec<f64>,
-    /// Variance that noise of the readings gives each row, and the least part of it that must be there.
+    /// Variance that noise of the readings gives each row, and the least part of it that must be
+    /// there.
     pub(crate) reading: Vec<f64>,
     pub(crate) least_reading_part: f64,
     /// Coefficients of the force that the motion asks for.
@@ -126,8 +127,8 @@ impl Problem {
         all
     }
 
-    /// Where the drive supplies next to nothing, all-zero coefficients would fit best: the inertia is
-    /// then the scale, and known.
+    /// Fixes the inertia where the drive supplies next to nothing: all-zero coefficients would fit
+    /// best.
     fn fix_inertia_if_not_driven(&mut self) {
         let fit = self.tiling.fit_rows;
         let power = |x: &[f64]| dot(&x[..fit], &x[..fit]);

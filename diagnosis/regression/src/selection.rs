@@ -34,7 +34,7 @@ pub(crate) struct Search {
 }
 
 impl Search {
-    /// Chooses up to three laws. The hold-out is not read.
+    /// Chooses up to three laws. The holdout is not read.
     pub(crate) fn run(problem: Problem) -> (Self, Vec<Round>) {
         let mut search = Self { problem, candidates: Vec::new() };
         search.add_all(ActsOn::Motion);
@@ -240,7 +240,7 @@ impl Search {
         }
     }
 
-    /// Reads the hold-out, and completes the evidence of each round's first laws. Nothing is chosen
+    /// Reads the holdout, and completes the evidence of each round's first laws. Nothing is chosen
     /// after this.
     pub(crate) fn evidence(&self, rounds: &[Round]) -> Vec<Vec<Evidence>> {
         let free = self.problem.free_form();
@@ -290,7 +290,7 @@ impl Search {
         HeldOut { share, z: over_error(&gains), size_agreement }
     }
 
-    /// Force error of the fit (left-out frames) and of the hold-out, N·m or N rms, of a model with
+    /// Force error of the fit (left-out frames) and of the holdout, N·m or N rms, of a model with
     /// the laws of all `rounds` before and with `last`.
     pub(crate) fn force_error(&self, rounds: &[Round]) -> [f64; 2] {
         let chosen: Vec<usize> = rounds.iter().map(|r| r.ranked[0].candidate).collect();

@@ -75,7 +75,7 @@ impl Lapped {
     }
 }
 
-/// How one recording is cut into frames.
+/// The frames of one recording.
 pub(crate) struct Cut {
     /// Points of the grid for one of the laws' (odd), and for one of the transform's.
     pub(crate) law_step: usize,

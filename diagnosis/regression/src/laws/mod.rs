@@ -16,7 +16,7 @@ pub use states::{Scales, States};
 
 use crate::data::Rig;
 
-/// What a law acts on.
+/// The signals that a law acts on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ActsOn {
     /// The motion alone.
@@ -25,7 +25,7 @@ pub enum ActsOn {
     Command,
 }
 
-/// What a law's coefficient may be.
+/// The values that a law's coefficient may have.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Size {
     /// Anything.
@@ -57,14 +57,14 @@ pub struct Law {
     pub equation: &'static str,
     /// The meaning of the shape's value.
     pub words: &'static str,
-    /// What it acts on.
+    /// The signals that it acts on.
     pub acts_on: ActsOn,
     /// True if its columns are a sine and a cosine of the place: without an absolute reading every
     /// recording has a phase of its own.
     pub wave: bool,
-    /// What its first coefficient may be.
+    /// The values that its first coefficient may have.
     pub size: Size,
-    /// The law of which it is a refinement: that goes first where the rig has none.
+    /// The plain law that it refines: that one goes first where the rig has none.
     pub refines: Option<&'static str>,
     /// Its shapes on a machine; none where the recordings or the rig rule it out.
     pub shapes: fn(&Machine) -> Vec<Shape>,

@@ -135,7 +135,13 @@ fn jumps(s: &Signals, rig: &Rig) -> Vec<f64> {
     for i in 0..n {
         let near = i.saturating_sub(3 * w)..(i + 3 * w + 1).min(n);
         let against = steps[i].abs() > least && steps[i] * s.v[i] < 0.0;
-        if against && near.clone().all(|k| steps[k].abs() <= steps[i].abs()) {
+        // Beside a step, where it falls between two outer windows, the difference has the other
+        // sign.
+        let smaller = |k: usize| {
+            let (other, this) = (steps[k] * steps[i].signum(), steps[i].abs());
+            other < this || (k >= i && other == this)
+        };
+        if against && near.clone().all(smaller) {
             lost -= steps[i];
         }
         out[i] = lost;

@@ -112,7 +112,8 @@ fn lag_and_delay_are_the_inverse_maps_of_the_force() {
 fn a_clip_and_a_deadband_are_undone() {
     let u = |t: f64| 0.9 * (5.0 * t).sin();
     let m = machine(|t| t, u);
-    // The drive gives c/(1 + |c|^6)^(1/6) of a command c: its command beyond the force is the column.
+    // The drive gives c/(1 + |c|^6)^(1/6) of a command c: its command beyond the force is the
+    // column.
     let soft = |c: f64| c / (1.0 + c.abs().powi(6)).powf(1.0 / 6.0);
     for (f, extra) in m.asked[0].iter().zip(&column(&m, "command_saturation", "6", 1.0)[0]) {
         assert!((soft(f + extra) - f).abs() < 1e-9, "{f} {extra}");
