@@ -191,7 +191,7 @@ mod tests {
             let reached = ground.leaves(&drawn.effect).unwrap() / left;
             assert!((reached - 1.0).abs() < 0.11, "{name}: {reached} of what was asked for");
             assert!(drawn.oracle.solves(), "{name}: {:?}", drawn.oracle);
-            let found = plain::select(&ground.written(&drawn), 0.15, plain::Best::TakesMost);
+            let found = plain::select(&ground.written(&drawn), 0.15);
             assert!(found.iter().any(|f| f.name == name), "{name}: {found:?}");
         }
     }

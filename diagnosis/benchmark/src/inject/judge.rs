@@ -3,7 +3,7 @@
 
 use serde_json::Value;
 
-use super::plain::{Best, Found};
+use super::plain::Found;
 use super::regress::Oracle;
 use crate::expected_answer::ExpectedAnswer;
 use crate::tool::{Answer, Named};
@@ -26,26 +26,10 @@ pub(crate) struct Case {
     pub(crate) own: Vec<Named>,
     /// The names that are believed of the untouched machine, where somebody wrote them down.
     pub(crate) believed: Option<ExpectedAnswer>,
-    /// The plain rivals: what they find here, and what they find on the untouched machine.
-    pub(crate) plain: Plain,
-    pub(crate) plain_own: Plain,
+    /// The findings of the plain rival here, and on the untouched machine.
+    pub(crate) plain: Vec<Found>,
+    pub(crate) plain_own: Vec<Found>,
     pub(crate) seconds: f64,
-}
-
-/// Findings of the plain rivals, by the rule that chose among the laws that take enough.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Plain {
-    pub(crate) by_share: Vec<Found>,
-    pub(crate) by_evidence: Vec<Found>,
-}
-
-impl Plain {
-    pub(crate) fn of(&self, best: Best) -> &[Found] {
-        match best {
-            Best::TakesMost => &self.by_share,
-            Best::Evidence => &self.by_evidence,
-        }
-    }
 }
 
 /// The rank of an effect among the hypotheses of the report.
@@ -161,18 +145,18 @@ impl Case {
         }
     }
 
-    /// A plain rival's names from a share of the force error on, in the same way.
-    pub(crate) fn plain_names(&self, best: Best, least: f64) -> Vec<(&'static str, bool)> {
+    /// The plain rival's names from a share of the force error on, in the same way.
+    pub(crate) fn plain_names(&self, least: f64) -> Vec<(&'static str, bool)> {
         let taken = |list: &[Found]| -> Vec<&'static str> {
             list.iter().take_while(|found| found.share >= least).map(|found| found.name).collect()
         };
-        let own = taken(self.plain_own.of(best));
-        let names = taken(self.plain.of(best)).into_iter();
+        let own = taken(&self.plain_own);
+        let names = taken(&self.plain).into_iter();
         names.filter(|n| *n == self.hidden || !own.contains(n)).map(|n| (n, n == self.hidden)).collect()
     }
 
-    pub(crate) fn plain_said(&self, best: Best, least: f64) -> Said {
-        let names = self.plain_names(best, least);
+    pub(crate) fn plain_said(&self, least: f64) -> Said {
+        let names = self.plain_names(least);
         match names.iter().any(|(_, right)| *right) {
             true => Said::Found,
             false if names.is_empty() => Said::Silent,
@@ -189,7 +173,7 @@ pub(crate) mod tests {
     use serde_json::json;
 
     fn found(name: &'static str, share: f64) -> Found {
-        Found { name, share, nats: 0.0, lead: 0.0 }
+        Found { name, share }
     }
 
     pub(crate) fn case(hidden: &'static str, names: &[(&str, f64)], own: &[(&str, f64)]) -> Case {
@@ -205,8 +189,8 @@ pub(crate) mod tests {
             lost: Lost::NotListed,
             own: says(own).effects,
             believed: None,
-            plain: Plain { by_share: vec![found(hidden, 0.3), found("cogging", 0.06)], ..Plain::default() },
-            plain_own: Plain::default(),
+            plain: vec![found(hidden, 0.3), found("cogging", 0.06)],
+            plain_own: Vec::new(),
             seconds: 1.0,
         }
     }
@@ -222,10 +206,8 @@ pub(crate) mod tests {
         failed.answer = Err("it broke".into());
         assert_eq!(failed.said(), Said::NoReport);
         let plain = case("quadratic_drag", &[], &[]);
-        assert_eq!(plain.plain_names(Best::TakesMost, 0.05).len(), 2);
-        let said = |best, least| plain.plain_said(best, least);
-        assert_eq!((said(Best::TakesMost, 0.15), said(Best::TakesMost, 0.4)), (Said::Found, Said::Silent));
-        assert_eq!(said(Best::Evidence, 0.15), Said::Silent);
+        assert_eq!(plain.plain_names(0.05).len(), 2);
+        assert_eq!((plain.plain_said(0.15), plain.plain_said(0.4)), (Said::Found, Said::Silent));
     }
 
     #[test]

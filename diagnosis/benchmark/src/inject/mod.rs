@@ -4,7 +4,6 @@
 mod carrier;
 mod case;
 mod conceal;
-mod discrepancy;
 #[cfg(test)]
 mod exact;
 mod judge;
@@ -25,8 +24,7 @@ use std::time::Instant;
 
 use carrier::{Carrier, Place};
 use case::{Drawn, Ground};
-use judge::{Case, Plain};
-use plain::Best;
+use judge::Case;
 use untouched::Untouched;
 
 use crate::options::Options;
@@ -48,8 +46,8 @@ const CASES: usize = 44;
 struct Known {
     place: Place,
     untouched: Untouched,
-    /// The findings of the plain rivals, once they have been run.
-    plain: OnceLock<Plain>,
+    /// The findings of the plain rival, once it has been run.
+    plain: OnceLock<Vec<plain::Found>>,
     /// Its recordings, once a draw has asked for them; none where they cannot be read.
     ground: OnceLock<Option<Ground>>,
 }
@@ -218,8 +216,7 @@ fn run_case(
     let report = report.and_then(|text| serde_json::from_str(&text).ok()).unwrap_or_default();
     let plain = |carrier: &Carrier| {
         let least = PLAIN_SHARES.iter().copied().fold(1.0, f64::min);
-        let by = |best| plain::select(carrier, least, best);
-        Plain { by_share: by(Best::TakesMost), by_evidence: by(Best::Evidence) }
+        plain::select(carrier, least)
     };
     let case = Case {
         id,

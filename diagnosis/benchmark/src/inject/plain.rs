@@ -1,14 +1,12 @@
 //! The plain rival: forward selection by least squares on shares of the force error, as an engineer
 //! writes it in an evening. A law counts by the smaller of its reductions on stretches left out of
 //! the fit and on the held-out recordings, and only if its size is the same on both within a factor
-//! of two; the best goes in, which is the one that takes most, or the one with the largest evidence
-//! in addition to a flexible discrepancy. Laws of the command act on the command that the model so
-//! far predicts, never on the recorded one, which holds the noise that is to be explained.
+//! of two; the one that takes most goes in. Laws of the command act on the command that the model
+//! so far predicts, never on the recorded one, which holds the noise that is to be explained.
 
 use std::rc::Rc;
 
 use super::carrier::Carrier;
-use super::discrepancy::{Basis, Scale};
 use super::plain_laws::{Candidate, candidates};
 use super::regress::{Block, left_on, left_out, solve};
 use super::sight::{Sight, band};
@@ -18,26 +16,12 @@ const MOST: usize = 3;
 /// Size on the held-out recordings over that on the others: within this factor.
 const SAME_SIZE: f64 = 2.0;
 
-/// Which of the laws that take enough goes in next.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Best {
-    /// The one that takes most.
-    TakesMost,
-    /// The one with the largest evidence in addition to a flexible discrepancy, if that is more
-    /// than without it.
-    Evidence,
-}
-
 /// A law that went in, in order.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Found {
     pub(crate) name: &'static str,
     /// Share of the force error that it took.
     pub(crate) share: f64,
-    /// Evidence that it adds to a flexible discrepancy, nats, where that was asked for, and its
-    /// lead over every other law.
-    pub(crate) nats: f64,
-    pub(crate) lead: f64,
 }
 
 /// The columns of one law on every recording, those to fit on first.
@@ -50,7 +34,7 @@ struct Tried {
 }
 
 /// Selects laws while the best takes `least` of the force error.
-pub(crate) fn select(carrier: &Carrier, least: f64, by: Best) -> Vec<Found> {
+pub(crate) fn select(carrier: &Carrier, least: f64) -> Vec<Found> {
     let sights: Vec<Sight> = carrier.recordings().map(|r| Sight::of(r, &carrier.rig, band(r))).collect();
     let fits = carrier.fits.len();
     let mut taken: Vec<Rc<Tried>> = Vec::new();
@@ -66,8 +50,6 @@ pub(crate) fn select(carrier: &Carrier, least: f64, by: Best) -> Vec<Found> {
         let coefficients = solve(&base[..fits]);
         let errors = (left_out(&base[..fits]), held_out(&base[fits..], &coefficients, &taken, &sights));
         let predicted = predictions(&sights, &coefficients);
-        let basis = (by == Best::Evidence).then(|| Basis::new(&sights[..fits], &predicted[..fits]));
-        let beside = basis.map(|basis| Beside::new(basis, &base[..fits]));
         let mut all_enough: Vec<(Found, Rc<Tried>)> = Vec::new();
         for (candidate, kept) in all.iter().zip(&mut kept) {
             if found.iter().any(|f| f.name == candidate.name) {
@@ -84,45 +66,14 @@ pub(crate) fn select(carrier: &Carrier, least: f64, by: Best) -> Vec<Found> {
             if share < least {
                 continue;
             }
-            let nats = beside.as_ref().map_or(0.0, |one| one.gain(&sights, fits, &taken, &tried));
-            all_enough.push((Found { name: tried.name, share, nats, lead: 0.0 }, tried));
+            all_enough.push((Found { name: tried.name, share }, tried));
         }
-        let Some((next, tried)) = best(all_enough, by) else { break };
+        let most = all_enough.into_iter().max_by(|a, b| a.0.share.total_cmp(&b.0.share));
+        let Some((next, tried)) = most else { break };
         found.push(next);
         taken.push(tried);
     }
     found
-}
-
-/// The law that goes in next.
-fn best(enough: Vec<(Found, Rc<Tried>)>, by: Best) -> Option<(Found, Rc<Tried>)> {
-    let score = |found: &Found| if by == Best::Evidence { found.nats } else { found.share };
-    let (first, tried) = enough.iter().max_by(|a, b| score(&a.0).total_cmp(&score(&b.0)))?;
-    let others = enough.iter().map(|(found, _)| found).filter(|found| found.name != first.name);
-    let lead = first.nats - others.map(|found| found.nats).fold(0.0, f64::max);
-    (by == Best::TakesMost || first.nats > 0.0).then(|| (Found { lead, ..*first }, Rc::clone(tried)))
-}
-
-/// The hypothesis of the laws so far together with a flexible discrepancy.
-struct Beside {
-    basis: Basis,
-    scale: Scale,
-    before: f64,
-}
-
-impl Beside {
-    fn new(basis: Basis, before: &[Block]) -> Self {
-        let scale = basis.scale(before);
-        Self { before: basis.evidence(before, scale), basis, scale }
-    }
-
-    /// Evidence that one law more adds, nats.
-    fn gain(&self, sights: &[Sight], fits: usize, taken: &[Rc<Tried>], tried: &Rc<Tried>) -> f64 {
-        let mut laws = taken.to_vec();
-        laws.push(Rc::clone(tried));
-        let with = blocks(sights, fits, &laws);
-        self.basis.evidence(&with[..fits], self.scale) - self.before
-    }
 }
 
 fn columns(candidate: &Candidate, sights: &[Sight], predicted: &[Vec<f64>]) -> Tried {
@@ -273,11 +224,7 @@ pub(crate) mod tests {
     }
 
     fn names(extra: impl Fn(f64, f64) -> f64 + Copy) -> Vec<&'static str> {
-        let by_share = select(&carrier(extra), 0.15, Best::TakesMost);
-        let by_evidence = select(&carrier(extra), 0.15, Best::Evidence);
-        let names = |found: Vec<Found>| found.iter().map(|f| f.name).collect::<Vec<_>>();
-        assert_eq!(names(by_share.clone()), names(by_evidence));
-        names(by_share)
+        select(&carrier(extra), 0.15).iter().map(|found| found.name).collect()
     }
 
     #[test]

@@ -6,8 +6,8 @@ use std::fmt::Write as _;
 use serde_json::{Value, json};
 
 use super::PLAIN_SHARES;
-use super::judge::{Case, Plain, Said};
-use super::plain::{Best, Found};
+use super::judge::{Case, Said};
+use super::plain::Found;
 use crate::metrics::{BELIEVED, Reliability};
 use crate::stats::Rate;
 use crate::tool::Named;
@@ -33,26 +33,21 @@ fn rate(cases: &[&Case], hit: impl Fn(&Case) -> bool) -> Rate {
 enum Method {
     Tool,
     /// A plain regression, named from this share of the force error on.
-    Plain(Best, f64),
+    Plain(f64),
 }
 
 impl Method {
     fn name(self) -> String {
         match self {
             Method::Tool => "the tool".into(),
-            Method::Plain(Best::TakesMost, share) => {
-                format!("plain regression from {:.0} %", 100.0 * share)
-            }
-            Method::Plain(Best::Evidence, share) => {
-                format!("the same beside a flexible discrepancy, from {:.0} %", 100.0 * share)
-            }
+            Method::Plain(share) => format!("plain regression from {:.0} %", 100.0 * share),
         }
     }
 
     fn said(self, case: &Case) -> Said {
         match self {
             Method::Tool => case.said(),
-            Method::Plain(best, share) => case.plain_said(best, share),
+            Method::Plain(share) => case.plain_said(share),
         }
     }
 
@@ -64,8 +59,8 @@ impl Method {
                 .into_iter()
                 .map(|(named, right)| (right, right || case.is_believed(&named.name, named.judged_class())))
                 .collect(),
-            Method::Plain(best, share) => case
-                .plain_names(best, share)
+            Method::Plain(share) => case
+                .plain_names(share)
                 .into_iter()
                 .map(|(name, right)| (right, right || case.is_believed(name, &[])))
                 .collect(),
@@ -109,10 +104,7 @@ fn overall(out: &mut String, cases: &[&Case]) {
             .filter(|c| c.oracle.solves() == solved && (c.factor == factor || !solved))
             .collect()
     };
-    let plain = [Best::TakesMost, Best::Evidence]
-        .into_iter()
-        .flat_map(|best| PLAIN_SHARES.map(|share| Method::Plain(best, share)));
-    for method in [Method::Tool].into_iter().chain(plain) {
+    for method in [Method::Tool].into_iter().chain(PLAIN_SHARES.map(Method::Plain)) {
         let found = |list: &[&Case]| rate(list, |c| method.said(c) == Said::Found).text();
         let (mut wrong, mut unbelieved) = (Rate::default(), Rate::default());
         for (right, known) in cases.iter().flat_map(|c| method.names(c)) {
@@ -151,7 +143,7 @@ fn grouped(out: &mut String, title: &str, cases: &[&Case], key: impl Fn(&Case) -
                 count(Said::Silent) + count(Said::NoReport)
             )
         };
-        let plain = counts(Method::Plain(Best::TakesMost, PLAIN_SHARES[0]));
+        let plain = counts(Method::Plain(PLAIN_SHARES[0]));
         row(out, &[name, list.len().to_string(), counts(Method::Tool), plain]);
     }
 }
@@ -242,12 +234,8 @@ fn every(out: &mut String, cases: &[&Case]) {
         ],
     );
     for c in cases {
-        let plain: Vec<String> = c
-            .plain
-            .by_share
-            .iter()
-            .map(|found| format!("{} {:.0} %", found.name, 100.0 * found.share))
-            .collect();
+        let plain: Vec<String> =
+            c.plain.iter().map(|found| format!("{} {:.0} %", found.name, 100.0 * found.share)).collect();
         let solved = if c.oracle.solves() { "" } else { ", not solvable" };
         row(
             out,
@@ -268,10 +256,9 @@ fn every(out: &mut String, cases: &[&Case]) {
 /// Everything as JSON, for further work.
 pub(crate) fn json(first: &str, cases: &[&Case]) -> Value {
     let list = |all: &[Found]| -> Vec<Value> {
-        let one = |f: &Found| json!({ "name": f.name, "share": f.share, "nats": f.nats, "lead": f.lead });
+        let one = |f: &Found| json!({ "name": f.name, "share": f.share });
         all.iter().map(one).collect()
     };
-    let plain = |of: &Plain| json!({ "by_share": list(&of.by_share), "by_evidence": list(&of.by_evidence) });
     let one = |c: &&Case| {
         let names: Vec<Value> = c
             .new_names()
@@ -295,7 +282,7 @@ pub(crate) fn json(first: &str, cases: &[&Case]) -> Value {
             "strength": c.factor, "size": c.size, "solvable": c.oracle.solves(),
             "oracle": { "coefficient": c.oracle.coefficient, "share": c.oracle.share },
             "said": format!("{:?}", c.said()).to_lowercase(), "names": names, "answer": answer(c),
-            "lost": c.lost.word(), "rejected_because": c.lost.reason(), "plain": plain(&c.plain), "plain_untouched": plain(&c.plain_own),
+            "lost": c.lost.word(), "rejected_because": c.lost.reason(), "plain": list(&c.plain), "plain_untouched": list(&c.plain_own),
             "own": c.own.iter().map(|n| n.name.clone()).collect::<Vec<_>>(),
             "seconds": c.seconds, "weighed": weighed,
         })
