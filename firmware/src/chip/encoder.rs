@@ -54,11 +54,6 @@ pub(crate) struct EncoderLines {
 impl PulledLines for EncoderLines {
     const ALL: u8 = 0b11;
 
-    fn count(&self) -> Counts {
-        // SAFETY: reading the count changes nothing, and nobody stops the timer.
-        Counts(unsafe { &*TIM2::ptr() }.cnt().read().bits().cast_signed())
-    }
-
     fn has_supply(&self) -> bool {
         self.supply.is_closed()
     }

@@ -5,7 +5,7 @@ use crate::reset::LastWords;
 use crate::stage_timing::Stages;
 use crate::supervision::{Conditions, Reports, Trips};
 use control_core::config::{DacWidth, Sensors};
-use control_core::units::{DacCode, Milliradians};
+use control_core::units::{Counts, DacCode, Milliradians};
 use core::sync::atomic::{AtomicBool, AtomicI32, AtomicU8, AtomicU16, AtomicU32, Ordering::Relaxed};
 
 /// Enumerated, configured and not suspended: a bit of [`Shared::link`].
@@ -49,6 +49,7 @@ pub struct Shared {
     /// The words that survive a reset.
     pub last_words: &'static LastWords,
     given: AtomicU16,
+    count: AtomicI32,
     tilt_mrad: AtomicI32,
     /// The optional sensors that are there: `ENCODER_SUPPLY`, `CURRENT`.
     fitted: AtomicU8,
@@ -77,6 +78,7 @@ impl Shared {
             discard: AtomicBool::new(false),
             last_words,
             given: AtomicU16::new(DacWidth::BITS_16.mid_scale()),
+            count: AtomicI32::new(0),
             tilt_mrad: AtomicI32::new(0),
             fitted: AtomicU8::new(0),
         }
@@ -103,6 +105,16 @@ impl Shared {
     /// The code that was given out last, of 12 bits.
     pub fn given(&self) -> DacCode {
         DacCode(self.given.load(Relaxed) >> 4)
+    }
+
+    /// Gives the supervisor the encoder's count.
+    pub(crate) fn set_count(&self, count: Counts) {
+        self.count.store(count.0, Relaxed);
+    }
+
+    /// The encoder's count in the latest tick.
+    pub fn count(&self) -> Counts {
+        Counts(self.count.load(Relaxed))
     }
 
     /// Gives the tick a new inclination.

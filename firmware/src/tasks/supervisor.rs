@@ -46,7 +46,7 @@ impl<B: Board> Watch<B> {
     fn look_at_conditions(&mut self) {
         self.shared.conditions.set(Interlock::Supply, self.supply.is_low());
         let (lines, watch) = &mut self.encoder;
-        let wires = watch.look(lines);
+        let wires = watch.look(lines, self.shared.count());
         self.shared.conditions.set(Interlock::EncoderWire, wires.off);
         self.shared.lines_agree.store(wires.agree, Relaxed);
         let (lines, monitor) = &mut self.drive;

@@ -169,10 +169,6 @@ pub(super) struct Lines(pub(super) Pull);
 impl PulledLines for Lines {
     const ALL: u8 = 0b11;
 
-    fn count(&self) -> Counts {
-        Counts(world().count.get())
-    }
-
     fn has_supply(&self) -> bool {
         false
     }
