@@ -108,8 +108,8 @@ impl Shared {
     }
 
     /// Gives the supervisor the encoder's count.
-    pub(crate) fn set_count(&self, count: Counts) {
-        self.count.store(count.0, Relaxed);
+    pub(crate) fn set_count(&self, count: i32) {
+        self.count.store(count, Relaxed);
     }
 
     /// The encoder's count in the latest tick.

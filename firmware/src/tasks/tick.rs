@@ -88,14 +88,13 @@ impl<B: Board> Tick<B> {
         if !self.shared.trips.is_empty() {
             self.take_torque_away();
         }
-        let count = input.count;
         let output = self.controller.tick(input);
         self.drive.apply(self.width, &output);
         let to_dac = self.timer.cycles_since_edge();
 
         // The code is out; what follows may take its time, up to the deadline.
         self.shared.set_given(self.width, output.dac);
-        self.shared.set_count(count);
+        self.shared.set_count(output.sample.count);
         if self.ends.outputs.enqueue(Ticked { tick: self.tick, output }).is_err() {
             // Telemetry sees the gap in the numbers and counts it.
         }
