@@ -4,7 +4,9 @@
 use control_core::NeedleLine;
 use control_core::config::MAX_LAYERS;
 use control_core::units::Millimetres;
-use core::sync::atomic::{AtomicI32, AtomicU32, AtomicUsize, Ordering::Relaxed, Ordering::SeqCst};
+use core::sync::atomic::{
+    AtomicI32, AtomicU32, AtomicUsize, Ordering::Relaxed, Ordering::SeqCst, compiler_fence,
+};
 use fixed::types::I16F16;
 
 /// Written by telemetry, read by the tick, which interrupts it and finds a line that is half
@@ -40,6 +42,9 @@ impl LatestLine {
     pub(crate) fn begin(&self) -> u32 {
         let number = self.number.load(Relaxed) & !1;
         self.number.store(number.wrapping_add(1), SeqCst);
+        // No depth is written before it: an ordering of the store holds back what comes before it
+        // only. The tick runs on the same core, so that this is for the compiler.
+        compiler_fence(SeqCst);
         number
     }
 
