@@ -147,38 +147,24 @@ pub(crate) const MISTAKEN: f64 = 0.2;
 /// limits, not noise, and shares decide: it is 1.9 in the median on generated nulls and 22 on axes
 /// of real machines (`docs/measured/diagnosis.md`).
 pub(crate) const LIMITED_BY_PHYSICS: f64 = 3.0;
-/// The same of the refit, below which noise is all there is, and what was found needs no share.
-pub(crate) const LEAVES_SOMETHING: f64 = 2.0;
 /// Most probability of a name that no share confirms where other physics limits: the gain of a law
 /// says little there.
 pub(crate) const SUREST_BESIDE_PHYSICS: f64 = 0.8;
-/// Part of the force error from which a law goes into the plain selection, and the factor within
-/// which its sizes on held-out and on fitted recordings are: those of the regression with which
-/// `prove --inject` compares the tool.
-pub(crate) const PLAIN_SHARE: f64 = 0.05;
-pub(crate) const PLAIN_SAME_SIZE: f64 = 2.0;
-/// Part of the force error from which what a plain selection finds first contests the names of the
-/// other selection. Set on seed 63101: of names so contested 23 of 47 are right, and 16 of 34 of
-/// what contests them.
-pub(crate) const CONTESTS: f64 = 0.15;
-/// Part of the force error, root mean square, on stretches left out of the fit and on held-out
-/// recordings, from which an effect joins the regression: with two effects in the recordings the
-/// first alone takes little.
-pub(crate) const TAKEN_SHARE: f64 = 0.1;
-/// Part of the force error, in addition to the other effects, from which an effect is named. In 66
-/// cases of effects concealed in both sets of machines (seed 36101) 20 to 35 % find as many of
-/// those concealed three times as strong as what the model leaves, and 20 % most of those as
-/// strong.
-pub(crate) const NAMED_SHARE: f64 = 0.2;
-/// Factors between its sizes on held-out and on fitted recordings: in 90 cases of seed 52302 two of
-/// the ten wrong names were outside.
-pub(crate) const SAME_SIZE_OF_SHARE: Range<f64> = 0.6..1.67;
-/// Part of what an effect leaves that a force of any form over the motion must leave if it replaces
-/// the effect: if the form leaves less, the law is another one. In the same cases the least of a
-/// right name is 0.77.
-pub(crate) const FORM_LEAVES: f64 = 0.7;
-/// Part of what an effect leaves by which a rival may leave more and still join its class.
-pub(crate) const AS_GOOD: f64 = 0.05;
+/// Part of the force error, on left-out frames of the fit and on held-out recordings, from which a
+/// law of the regression is named; least z of what it takes, frame by frame; and least agreement of
+/// its sizes, on halves of the fit and on held-out recordings. The prototype's rule C0.
+pub(crate) const NAMED_SHARE: f64 = 0.15;
+pub(crate) const TAKEN_Z: f64 = 1.0;
+pub(crate) const SIZES_AGREE: f64 = 0.4;
+/// Part of the force error from which a mismatch is called no random one: a tenth of its square.
+pub(crate) const FOLLOWS_SHARE: f64 = 0.05;
+/// Part of its share that a rival must take, and standard errors by which it must be behind at
+/// most, to join its class. The same rule.
+pub(crate) const NEAR_SHARE: f64 = 0.85;
+pub(crate) const NEAR_LEAD_Z: f64 = 2.0;
+/// Factor on the force error below which the filter's model leaves clearly less than that of what
+/// the regression names, and is taken. From 0.7 to 1 the same is found.
+pub(crate) const CLEARLY_LESS: f64 = 0.9;
 /// Log-odds of a name by shares, without a share and per share: in 90 cases of seed 52302 24 of 30
 /// names were right with a share below 0.4, 16 of 20 below 0.6 and 26 of 26 above.
 pub(crate) const SHARE_ODDS: (f64, f64) = (0.6, 4.0);

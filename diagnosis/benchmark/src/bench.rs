@@ -6,6 +6,7 @@ use std::time::Instant;
 
 use crate::baselines;
 use crate::dynamics::Bench;
+use crate::evidence;
 use crate::generator::case::build;
 use crate::generator::files;
 use crate::generator::spec::Spec;
@@ -50,6 +51,7 @@ fn run_case(
     let answer = ask(tool, &paths, &out);
     let seconds = start.elapsed().as_secs_f64();
     let key = files::key(&case);
+    evidence::collect(options, [&spec.name(), "generator"], &key.effects, &out)?;
     let bench = Bench::new(&paths, &key);
     let left = report_residuals::judged(&bench, &out);
     let reported = report_residuals::reported(&paths, &out, &key);

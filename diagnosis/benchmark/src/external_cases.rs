@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use crate::baselines;
 use crate::dynamics::Bench;
+use crate::evidence;
 use crate::folder::{self, ExternalCase, Truth};
 use crate::judge::Record;
 use crate::key::{Category, Key};
@@ -82,6 +83,7 @@ fn run_case(
         Truth::Known(key) => key.clone(),
         Truth::Believed(_) => Key::of(Category::Null),
     };
+    evidence::collect(options, [&case.id, &case.id], &key.effects, &out)?;
     let bench = Bench::new(&paths, &key);
     let left = report_residuals::judged(&bench, &out);
     let reported = report_residuals::reported(&paths, &out, &key);

@@ -4,7 +4,7 @@ use crate::baselines::Opinion;
 use crate::key::{Category, Key};
 use crate::report_residuals::Left;
 use crate::share::{EXPLAINABLE, share};
-use crate::tool::{Answer, Named, Weighed};
+use crate::tool::{Answer, Named};
 
 /// From this confidence on a wrong name is confidently wrong.
 pub(crate) const CONFIDENT: f64 = 0.8;
@@ -47,16 +47,6 @@ impl Record {
     /// True if the name or its class is among the hidden effects.
     pub(crate) fn is_true(&self, named: &Named) -> bool {
         self.key.effects.iter().any(|hidden| named.holds(hidden))
-    }
-
-    /// Returns the hypotheses that came through the tool's search with their evidence, and whether
-    /// each was right.
-    pub(crate) fn weighed(&self) -> impl Iterator<Item = (&Weighed, bool)> {
-        let all = self.answer.as_ref().map_or(&[][..], |a| &a.weighed);
-        all.iter().map(|w| {
-            let named = Named { name: w.name.clone(), class: w.class.clone(), ..Named::default() };
-            (w, self.is_true(&named))
-        })
     }
 
     /// The first name itself is hidden.

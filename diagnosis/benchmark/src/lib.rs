@@ -7,9 +7,9 @@
 mod answers;
 mod baselines;
 mod bench;
-mod calibrate;
 mod cases;
 mod dynamics;
+mod evidence;
 mod expected_answer;
 mod external_cases;
 mod folder;
@@ -52,10 +52,6 @@ const PATIENCE: Duration = Duration::from_secs(600);
 /// # Errors
 /// One sentence: what could not be read, written or run, and where.
 pub fn run(options: &Options) -> Result<(), String> {
-    if !options.calibrate.is_empty() {
-        print!("{}", calibrate::calibrate(&options.calibrate)?);
-        return Ok(());
-    }
     if options.settle {
         return settle::run(options);
     }

@@ -30,9 +30,8 @@ pub struct Options {
     pub write: Option<PathBuf>,
     /// Only cases whose category or hidden physics contains this text.
     pub only: Option<String>,
-    /// Results of earlier runs: find the weights of the tool's confidence from them, and run
-    /// nothing.
-    pub calibrate: Vec<PathBuf>,
+    /// A table that gets a row for every hypothesis of every case.
+    pub evidence: Option<PathBuf>,
     /// Folders of cases that somebody else made: judge these and draw none.
     pub cases_from: Vec<PathBuf>,
     /// Folders of real machines: conceal effects in their recordings and judge those.
@@ -65,7 +64,7 @@ impl Default for Options {
             minutes: None,
             write: None,
             only: None,
-            calibrate: Vec::new(),
+            evidence: None,
             cases_from: Vec::new(),
             inject: Vec::new(),
             untouched: None,
@@ -91,7 +90,7 @@ const FLAGS: [&str; 17] = [
     "--minutes",
     "--only",
     "--write",
-    "--calibrate",
+    "--evidence",
     "--cases-from",
     "--inject",
     "--untouched",
@@ -133,7 +132,8 @@ pub const HELP: &str = "prove: the blinded benchmark of the diagnosis
   --same-as 'PROGRAM …'  with --tool: diagnose --cases N drawn recordings (100) with both programs, compare diagnosis.json and
                 patched-rig.toml to the digit, print the keys that differ, and fail if there is one
   --write DIR   write the recordings to DIR/cases and the key to DIR/key.json, and run nothing
-  --calibrate A,B  print the weights of the tool's confidence from proof.json of earlier runs, and run nothing
+  --evidence FILE  add a row for every hypothesis of every case to a CSV table: what the filter and the regression say of it, in
+                the same numbers on every machine, and whether it is right
   --out DIR     folder for proof.json and proof.md, of a folder of cases proof-NAME.json and proof-NAME.md (target); those of
                 --settle and --inject are written anew after every case
 ";
@@ -184,7 +184,7 @@ impl Options {
                 "--jobs" => options.jobs = whole("a whole number from 1")?.clamp(1, 256) as usize,
                 "--minutes" => options.minutes = Some(whole("a whole number of minutes")?),
                 "--only" => options.only = Some(value),
-                "--calibrate" => options.calibrate = value.split(',').map(PathBuf::from).collect(),
+                "--evidence" => options.evidence = Some(PathBuf::from(value)),
                 "--write" => options.write = Some(PathBuf::from(value)),
                 "--cases-from" => options.cases_from.push(PathBuf::from(value)),
                 "--inject" => options.inject.push(PathBuf::from(value)),

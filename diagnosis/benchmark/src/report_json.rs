@@ -6,11 +6,6 @@ use crate::judge::Record;
 use crate::metrics::Metrics;
 use crate::report::Run;
 use crate::stats::{Rate, quantile};
-use crate::tool::Weighed;
-
-fn weighed_json((weighed, right): (&Weighed, bool)) -> Value {
-    json!({ "name": weighed.name, "right": right, "evidence": weighed.evidence })
-}
 
 pub(crate) fn case_json(r: &Record) -> Value {
     let effects: Vec<Value> = r
@@ -25,7 +20,7 @@ pub(crate) fn case_json(r: &Record) -> Value {
         "answer": r.answer_text(), "refit": left.map(|l| l.refit), "patched": left.map(|l| l.patched), "unjudged": r.left.as_ref().err(),
         "reported_gain_over_oracle": r.reported_gain().map(|g| g.of_oracle),
         "gain": gain,
-        "seconds": r.seconds, "weighed": r.weighed().map(weighed_json).collect::<Vec<_>>(),
+        "seconds": r.seconds,
     })
 }
 

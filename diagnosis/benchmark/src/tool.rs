@@ -1,11 +1,12 @@
 //! The tool under test as the judge sees it: files in, the contract's report out.
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
+
+use crate::evidence;
 
 /// The paths of a case's files.
 #[derive(Clone, Debug)]
@@ -48,7 +49,8 @@ impl Tool for Diagnosis {
             holdout: paths.holdout.clone(),
         };
         let outcome = diagnosis::diagnose(&request, &|_, _| {}).map_err(|e| e.to_string())?;
-        outcome.write(out).map_err(|e| e.to_string())
+        outcome.write(out).map_err(|e| e.to_string())?;
+        std::fs::write(out.join(evidence::FILE), outcome.hypotheses_csv()).map_err(|e| e.to_string())
     }
 }
 
@@ -149,15 +151,6 @@ impl Named {
     }
 }
 
-/// An effect that came through the tool's search, with the evidence that its confidence weighs;
-/// named or not.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Weighed {
-    pub(crate) name: String,
-    pub(crate) class: Vec<String>,
-    pub(crate) evidence: BTreeMap<String, f64>,
-}
-
 /// The parts of `diagnosis.json` and `patched-rig.toml` that the judge reads.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Answer {
@@ -165,8 +158,6 @@ pub(crate) struct Answer {
     /// There was no fit: the recordings were turned away before.
     pub(crate) refused: bool,
     pub(crate) effects: Vec<Named>,
-    /// For calibration only; another tool may have none.
-    pub(crate) weighed: Vec<Weighed>,
     /// Held-out force rmse under the refit and under the patched model.
     pub(crate) refit_holdout: f64,
     pub(crate) patched_holdout: f64,
@@ -219,7 +210,6 @@ pub(crate) fn read(report: &Value) -> Result<Answer, String> {
         refused: verdict == "insufficient_excitation" && (refit_holdout.is_nan() || refit_holdout == 0.0),
         verdict,
         effects,
-        weighed: weighed(report),
         refit_holdout,
         patched_holdout: number(&report["fit"]["patched"]["holdout"]),
         bandwidth_hz: number(&report["residual_bandwidth_hz"]),
@@ -229,18 +219,6 @@ pub(crate) fn read(report: &Value) -> Result<Answer, String> {
 
 fn strings(list: &Value) -> Option<Vec<String>> {
     Some(list.as_array()?.iter().filter_map(|v| v.as_str().map(String::from)).collect())
-}
-
-fn weighed(report: &Value) -> Vec<Weighed> {
-    let one = |hypothesis: &Value| {
-        let evidence = hypothesis["evidence"].as_object()?;
-        Some(Weighed {
-            name: hypothesis["name"].as_str()?.to_string(),
-            class: strings(&hypothesis["class"])?,
-            evidence: evidence.iter().filter_map(|(k, v)| Some((k.clone(), v.as_f64()?))).collect(),
-        })
-    };
-    report["hypotheses"].as_array().into_iter().flatten().filter_map(one).collect()
 }
 
 /// `gain` of `[actuator]`, read line by line: all that the judge needs of a rig file.

@@ -173,14 +173,15 @@ mod tests {
 
     #[test]
     fn friction_grows_with_the_load_or_with_what_the_drive_carries() {
-        let friction = |of_drive: f64, velocity: f64| {
-            let effect = Effect::shaped(EffectName::LoadDependentFriction, &[("of_drive", of_drive)]);
+        let friction = |name, velocity: f64| {
+            let effect = Effect::shaped(name, &[]);
             let (mut law, mut out) = (Law::new(&effect).unwrap(), [0.0]);
             law.terms(&State { velocity, external: 2.0, drive: -3.0, ..State::default() }, &mut out);
             out[0]
         };
-        assert_eq!([friction(0.0, 1.0), friction(0.0, -1.0)], [-2.0, 2.0]);
-        assert_eq!([friction(1.0, 1.0), friction(1.0, -1.0)], [-3.0, 3.0]);
+        let (load, drive) = (EffectName::LoadDependentFriction, EffectName::DriveLoss);
+        assert_eq!([friction(load, 1.0), friction(load, -1.0)], [-2.0, 2.0]);
+        assert_eq!([friction(drive, 1.0), friction(drive, -1.0)], [-3.0, 3.0]);
     }
 
     #[test]

@@ -13,7 +13,6 @@ mod formula;
 pub(crate) mod joint_terms;
 mod law;
 mod load;
-pub(crate) mod plain_laws;
 mod shape;
 mod state;
 mod travel_profile;
@@ -85,6 +84,7 @@ registry! {
     QuadraticDrag quadratic_drag;
     PositionDependentFriction position_dependent_friction;
     LoadDependentFriction load_dependent_friction;
+    DriveLoss drive_loss;
     FrictionDrift friction_drift;
     Cogging cogging;
     TorqueRipple torque_ripple;

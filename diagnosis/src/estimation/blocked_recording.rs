@@ -98,6 +98,16 @@ impl BlockedRecording {
         n as f64 / (self.blocks.start[n - 1] + self.blocks.span[n - 1])
     }
 
+    /// The place in the middle of a block, on which laws of the travel depend, rad or m.
+    pub(crate) fn place_at(&self, block: usize) -> f64 {
+        self.blocks.first_place + self.motion.x[block]
+    }
+
+    /// The places of all blocks.
+    pub(crate) fn places(&self) -> impl Iterator<Item = f64> + '_ {
+        self.motion.x.iter().map(|x| self.blocks.first_place + x)
+    }
+
     /// Mean tilt over a block, rad, and mean load, N·m or N; zero where not recorded.
     pub(crate) fn tilt_at(&self, block: usize) -> f64 {
         self.blocks.tilt.as_ref().map_or(0.0, |tilt| tilt[block])

@@ -24,6 +24,9 @@ pub(crate) struct Blocks {
     /// The encoder's position at zero travel, rad or m; it means something where the encoder is
     /// absolute.
     pub(crate) origin: f64,
+    /// The place at zero travel from which laws of the travel count, rad or m: the origin where the
+    /// encoder is absolute, zero where recordings are to start at one place.
+    pub(crate) first_place: f64,
     /// Start of each block since the first row, s.
     pub(crate) start: Vec<f64>,
     /// Length, s.
@@ -179,6 +182,7 @@ impl Blocks {
             lead_s,
             turn: rig.turn(),
             origin: recording.position_counts[0] * scale,
+            first_place: if rig.encoder.absolute { recording.position_counts[0] * scale } else { 0.0 },
             start: Vec::with_capacity(n),
             span: Vec::with_capacity(n),
             tau1: Vec::with_capacity(n),

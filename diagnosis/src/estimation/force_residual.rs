@@ -13,9 +13,6 @@ use std::f64::consts::TAU;
 /// Largest bandwidth, Hz.
 const WIDEST_HZ: f64 = 50.0;
 const NARROWEST_HZ: f64 = 3.0;
-/// Periods at the end of the band after which the estimator has forgotten all but a few
-/// thousandths.
-const KERNEL_PERIODS: f64 = 2.0;
 /// Part of the force that sensor noise may be in it: more hides the missing physics.
 const NOISY: f64 = 0.01;
 
@@ -52,24 +49,6 @@ impl Estimator {
         let walk = (TAU * self.bandwidth_hz).powi(6) * h;
         let noise = Noise { sensor: 1.0, white: 0.0, slow: walk * tau / 2.0, tau, rest: 0.0, blur: 0.0 };
         motion(&even, &noise, total, Knows::All).d
-    }
-}
-
-impl Estimator {
-    /// Returns the answer of the estimator to one block of acceleration, with that block in the
-    /// middle; it sums to one.
-    pub(crate) fn kernel(&self, track: &BlockedRecording) -> Vec<f64> {
-        let (n, middle) = (track.block_count(), track.block_count() / 2);
-        let h = track.blocks.span[middle];
-        let mut total = Total::zero(n);
-        (total.dv[middle], total.dq[middle]) = (h, 0.5 * h * h);
-        total.dz[middle] = track.blocks.tau2[middle];
-        let answer = self.residual_of(track, &vec![0.0; n], &total);
-        let half = ((KERNEL_PERIODS / self.bandwidth_hz * track.block_rate()).ceil() as usize)
-            .min(middle.min(n - 1 - middle));
-        let around = &answer[middle - half..=middle + half];
-        let sum: f64 = around.iter().sum();
-        around.iter().map(|x| x / sum).collect()
     }
 }
 

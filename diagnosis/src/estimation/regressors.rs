@@ -100,7 +100,7 @@ fn uses_command(effect: &Effect) -> bool {
 /// The state of the axis in block `j`, without its command.
 fn state_of_block(track: &BlockedRecording, j: usize) -> State {
     State {
-        position: track.motion.x[j],
+        position: track.place_at(j),
         velocity: track.motion.v[j],
         acceleration: track.acceleration(j),
         rest: track.motion.rest[j],
@@ -149,4 +149,53 @@ fn of_second_mass(
         }
     }
     slices.input(&signal)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::EffectName;
+    use crate::io::recording::Recording;
+    use crate::io::rig::Rig;
+
+    /// Damping along the travel over recordings of one swing, the second from a quarter of it on.
+    fn damping(absolute: bool) -> [Vec<f64>; 2] {
+        let mut rig = Rig::of_values(0.01, 0.0, 0.0);
+        rig.encoder.absolute = absolute;
+        let taken = |from: usize| {
+            let rows = from..from + 2000;
+            let time_s: Vec<f64> = rows.clone().map(|row| row as f64 * 1e-3).collect();
+            let counts = |t: &f64| (4000.0 * (3.0 * t).sin()).round();
+            let position_counts = time_s.iter().map(counts).collect();
+            let recording = Recording {
+                command: vec![0.0; time_s.len()],
+                position_counts,
+                time_s,
+                ..Recording::default()
+            };
+            let mut track = BlockedRecording::new(&recording, &rig);
+            let speed = |t: &f64| 12_000.0 * (3.0 * (t + rows.start as f64 * 1e-3)).cos();
+            track.motion.v = track.blocks.start.iter().map(speed).collect();
+            let shape = [("low", -2.0), ("high", 2.0), ("degree", 3.0)];
+            let effect = Effect::shaped(EffectName::PositionDependentDamping, &shape);
+            let inputs = effect_inputs(&track, &effect, &track.rows.command, 0.0, || track.drive(None));
+            match &inputs[0] {
+                Input::Held(column) => column.clone(),
+                _ => panic!("it is a force"),
+            }
+        };
+        [taken(0), taken(500)]
+    }
+
+    #[test]
+    fn an_absolute_encoder_says_where_a_law_of_the_travel_is() {
+        let differ = |[first, second]: [Vec<f64>; 2]| {
+            let later = first.len() / 4;
+            let of = first[later..].iter().zip(&second);
+            let largest = first.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+            of.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / largest
+        };
+        assert!(differ(damping(true)) < 0.03, "{}", differ(damping(true)));
+        assert!(differ(damping(false)) > 0.2, "without it each recording counts from its start");
+    }
 }

@@ -18,7 +18,6 @@ use crate::validation::free_form_check::{self, FreeFormShare, Unnamed};
 use crate::validation::holdout_set::HoldoutSet;
 use crate::validation::out_of_library::{self, Foreign};
 use crate::validation::parameters;
-use crate::validation::second_selection;
 use crate::validation::weighed_model::WeighedModel;
 
 /// Everything that the decision rests on.
@@ -61,7 +60,6 @@ pub(crate) fn assess(prepared: &Prepared, found: Found) -> Result<Assessment, Re
         return Err(reason);
     }
     let (mut weighed, beside) = free_form_check::check(weighed, &context);
-    second_selection::compare(&mut weighed, &prepared.plain);
     let named_alone = only_named(&scales, &mut weighed);
     let nothing_named = weighed.named().is_empty();
     let unnamed =

@@ -6,6 +6,7 @@ use super::contenders::contenders;
 use super::diagnosis::{
     Complete, Diagnosis, FreeForce, JudgedHypothesis, Moved, NamedEffect, Reason, Rigs, Series,
 };
+use super::evidence;
 use super::patched_rig::{patch, place};
 use super::prepare::Prepared;
 use super::run_forward::{follows_worse, pooled, simulated};
@@ -25,22 +26,24 @@ use crate::validation::comparison::Shown;
 use crate::validation::confidence;
 use crate::validation::free_form_check::{FreeFormShare, Unnamed};
 use crate::validation::known_travel;
+use crate::validation::material;
 use crate::validation::parameters;
-use crate::validation::plain_regression::{self, Left};
 use crate::validation::rejection::Rejection;
 use crate::validation::residual_maps::{self, Map};
 use crate::validation::residuals::{Residuals, above};
 use crate::validation::weighed_model::{WeighedEffect, WeighedModel};
+use regression::Hypothesis;
 
-/// Decides what is named; `holdout` are the held-out recordings as they were read, `rate_hz` the
-/// rows a second of the slowest one.
+/// Decides what is named; `rounds` are the regression's, `holdout` the held-out recordings as they
+/// were read, `rate_hz` the rows a second of the slowest one.
 pub(crate) fn decide(
     prepared: &Prepared,
     assessment: &Assessment,
+    rounds: &[Vec<Hypothesis>],
     holdout: &[Recording],
     rate_hz: Option<f64>,
 ) -> Diagnosis {
-    let decision = Decision { prepared, assessment };
+    let decision = Decision { prepared, assessment, rounds };
     let maps_with_all = decision.maps(&assessment.weighed.shown);
     let (verdict, reason) = decision.verdict(&maps_with_all);
     // The verdict rests on all that was weighed, what people see on what is named.
@@ -52,11 +55,12 @@ pub(crate) fn decide(
     let maps = with_named.map_or(maps_with_all, |shown| decision.maps(shown));
     let rigs = decision.rigs(shown);
     let simulated = simulated(&rigs.nominal, &rigs.refit, &rigs.patched, holdout);
+    let motion = pooled(&simulated);
     let smoothed = &assessment.holdout.smoothed;
     let estimator = &assessment.weighed.estimator;
     let mut series = all_series(estimator, &assessment.fit, &shown.on_fit, false);
     series.extend(all_series(estimator, smoothed, &shown.on_holdout, true));
-    let effects = decision.named_effects(with_named, pooled(&simulated).as_ref().is_some_and(follows_worse));
+    let effects = decision.named_effects(with_named, motion.as_ref().is_some_and(follows_worse));
     // What is named was tested, if not in every order.
     let is_open = |(name, _): &(EffectName, NotTested)| effects.iter().all(|one| !one.class.contains(name));
     let untested =
@@ -77,7 +81,8 @@ pub(crate) fn decide(
         place: nothing_found.then(|| top_place(smoothed, &named_alone.on_holdout.patched, &maps)),
         free_form: free_form(unnamed, assessment.beside.as_ref()),
         beyond_fitted: known_travel::beyond(smoothed, &shown.patched.model, &prepared.span),
-        simulation: pooled(&simulated),
+        evidence: evidence::rows(assessment, rounds, motion.as_ref()),
+        simulation: motion,
         simulated,
         series,
         maps,
@@ -104,6 +109,8 @@ fn moved(nominal: &Nominal, fit: &Fit) -> Moved {
 struct Decision<'a> {
     prepared: &'a Prepared,
     assessment: &'a Assessment,
+    /// What the regression proposes.
+    rounds: &'a [Vec<Hypothesis>],
 }
 
 impl Decision<'_> {
@@ -118,20 +125,11 @@ impl Decision<'_> {
     /// The verdict, and the residual where no effect is named; `maps` are of the residual of the
     /// whole model.
     fn verdict(&self, maps: &[Map]) -> (Verdict, Option<Reason>) {
-        let Assessment { fit, weighed, holdout, excitation, unnamed, foreign, .. } = self.assessment;
+        let Assessment { weighed, holdout, excitation, unnamed, foreign, .. } = self.assessment;
         let form = unnamed.is_some().then_some(Reason::FreeForm);
         let foreign = foreign.clone().map(Reason::Foreign).or(form);
-        let follows = || {
-            let Shown { on_fit, on_holdout, .. } = &weighed.shown;
-            let on = |tracks, of| Left::new(tracks, of, &weighed.estimator);
-            plain_regression::follows(
-                &on(fit, on_fit),
-                &on(&holdout.smoothed, on_holdout),
-                &weighed.estimator,
-                self.prepared.nominal.rig.turn(),
-            )
-            .map(|(what, part)| Reason::Follows { what, part })
-        };
+        let follows =
+            || material::follows(self.rounds).map(|(effect, share)| Reason::Follows { effect, share });
         verdict(weighed, maps, &holdout.smoothed, excitation, foreign, &follows)
     }
 

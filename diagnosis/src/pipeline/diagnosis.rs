@@ -1,5 +1,6 @@
 //! A finished diagnosis: everything that a report says, and nothing left to fit.
 
+use super::evidence::EvidenceRow;
 use crate::effects::EffectName;
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::io::rig::Rig;
@@ -50,8 +51,8 @@ pub(crate) enum Reason {
     Foreign(Foreign),
     /// A force of any form explains it.
     FreeForm,
-    /// A plain regression explains this part of it on held-out recordings; `what` is a noun phrase.
-    Follows { what: &'static str, part: f64 },
+    /// The regression finds an effect that takes this part of the force error, too little for a name.
+    Follows { effect: EffectName, share: f64 },
     /// The residual repeats where the motion does.
     Repeats { correlation: f64 },
 }
@@ -104,6 +105,8 @@ pub(crate) struct Complete {
     /// of them.
     pub(crate) simulated: Vec<Comparison>,
     pub(crate) simulation: Option<Simulation>,
+    /// The evidence for every hypothesis.
+    pub(crate) evidence: Vec<EvidenceRow>,
     /// Residuals of every recording, fitted ones first.
     pub(crate) series: Vec<Series>,
     /// Residuals over states.

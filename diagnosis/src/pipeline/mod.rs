@@ -1,21 +1,20 @@
 //! The stages of a diagnosis, one after another: this folder alone sequences them.
 //!
 //! [`prepare`] cuts rig and recordings into blocks and refits the nominal model; [`search`] adds
-//! and removes effects, [`reshaped_command`] those that only shrink the command; [`by_shares`]
-//! selects them by shares of the force error where other physics and not noise limits; [`assess`]
-//! weighs those that remain; [`decide`] names them, or says why nothing is named. Each stage is one
-//! function that takes what the one before it returns, and changes none of it. The result is a
-//! [`diagnosis::Diagnosis`].
+//! and removes effects by the filter, [`proposals`] asks the regression and [`by_regression`]
+//! fits what that names; [`assess`] weighs the effects of either; [`decide`] names those of one of
+//! them, or says why nothing is named. Each stage is one function that takes what the one before it
+//! returns, and changes none of it. The result is a [`diagnosis::Diagnosis`].
 
 mod assess;
-mod by_plain;
-mod by_shares;
+mod by_regression;
 mod contenders;
 mod decide;
 pub(crate) mod diagnosis;
+pub(crate) mod evidence;
 mod patched_rig;
 mod prepare;
-mod reshaped_command;
+mod proposals;
 mod run_forward;
 mod search;
 mod verdict;
@@ -27,12 +26,13 @@ use crate::io::recording::Recording;
 use crate::io::rig::Rig;
 use crate::io::sufficiency;
 use crate::selection::context::FittedModel;
+use crate::thresholds::CLEARLY_LESS;
+use crate::validation::residuals::above;
 use assess::Assessment;
-use by_plain::{by_plain, by_plain_alone};
-use by_shares::{ByShares, by_shares, confirmed};
+use by_regression::by_regression;
 use diagnosis::{Diagnosis, Reason};
 use prepare::Prepared;
-use reshaped_command::without_wrong_sizes;
+use regression::Hypothesis;
 use search::Found;
 
 /// A callback that receives the stage and the fraction done.
@@ -50,18 +50,18 @@ pub(crate) fn run(rig: &Rig, checked: &Checked, progress: Progress) -> Result<Di
         return Ok(Diagnosis::CannotTell { rig: Box::new(rig.clone()), reason, rate_hz: None });
     }
     let mut prepared = prepare::prepare(rig, checked, None, progress);
-    let mut found = search::search(&prepared, Vec::new(), progress);
+    let mut found = search::search(&prepared, progress);
     if let Some(rows) = hidden_skew(&prepared, &found) {
         prepared = prepare::prepare(rig, checked, Some(rows), progress);
-        found = search::search(&prepared, Vec::new(), progress);
+        found = search::search(&prepared, progress);
     }
-    let found = without_wrong_sizes(&prepared, found, progress);
     progress("comparing shares of the force", 0.9);
-    let assessed = assessed(&prepared, found);
+    let rounds = proposals::propose(&prepared, checked);
+    let assessed = assessed(&prepared, found, &rounds);
     progress("writing down", 0.95);
     let rate_hz = all.iter().map(|recording| recording.rate_hz()).min_by(f64::total_cmp);
     Ok(match assessed {
-        Ok(assessment) => decide::decide(&prepared, &assessment, holdout, rate_hz),
+        Ok(assessment) => decide::decide(&prepared, &assessment, &rounds, holdout, rate_hz),
         Err(reason) => Diagnosis::CannotTell { rig: Box::new(prepared.nominal.rig.clone()), reason, rate_hz },
     })
 }
@@ -76,49 +76,38 @@ fn hidden_skew(prepared: &Prepared, found: &Found) -> Option<f64> {
     skew::hidden(model, &prepared.nominal, &found.fit, noise, prepared.scale)
 }
 
-/// Assesses what was found; where nothing is named, what a plain selection found.
-fn assessed(prepared: &Prepared, found: Found) -> Result<Assessment, Reason> {
-    let by_plain = by_plain(prepared, &found);
-    let assessed = assessed_as_found(prepared, found);
-    match by_plain {
-        Some(plain) if assessed.as_ref().is_ok_and(|one| one.weighed.named().is_empty()) => {
-            let plain = by_selected(prepared, plain, None).and_then(by_plain_alone);
-            plain.map_or(assessed, Ok)
+/// Assesses what the regression names and what the filter found, and takes one of the two.
+fn assessed(prepared: &Prepared, found: Found, rounds: &[Vec<Hypothesis>]) -> Result<Assessment, Reason> {
+    let by_regression = by_regression(prepared, &found, rounds);
+    let by_regression = by_regression.and_then(|found| assess::assess(prepared, found).ok());
+    let by_filter = assess::assess(prepared, found);
+    let by_regression = by_regression.filter(|one| !one.weighed.named().is_empty() && lowers_error(one));
+    match (by_regression, by_filter) {
+        (Some(one), Ok(other)) if !is_taken(&one, &other) => Ok(other),
+        (Some(mut one), Ok(other)) => {
+            one.weighed.is_beside(&other.weighed);
+            Ok(one)
         }
-        _ => assessed,
+        (Some(one), Err(_)) => Ok(one),
+        (None, by_filter) => by_filter,
     }
 }
 
-/// Assesses what was found, by shares of the force error where other physics limits; where those
-/// name nothing in the end, likelihoods decide as elsewhere.
-fn assessed_as_found(prepared: &Prepared, found: Found) -> Result<Assessment, Reason> {
-    match by_shares(prepared, &found) {
-        ByShares::Nothing => assess::assess(prepared, found),
-        ByShares::Confirmed(materials) => assess::assess(prepared, confirmed(found, materials)),
-        ByShares::Selected { with, alone } => {
-            by_selected(prepared, *with, alone).map_or_else(|| assess::assess(prepared, found), Ok)
-        }
+/// True if the model of the regression's names is taken and not what the filter found: it is unless
+/// the other leaves clearly less of the force error of the fitted recordings, above the noise of
+/// reading whole counts. Held-out recordings choose nothing.
+fn is_taken(by_regression: &Assessment, by_filter: &Assessment) -> bool {
+    let left = |one: &Assessment| {
+        let table = &one.named_alone.as_ref().unwrap_or(&one.weighed.shown).table;
+        let above_noise = |rms: f64| above(rms, one.weighed.floor, 0.0);
+        above_noise(table.patched.fit) / above_noise(table.refit.fit).max(1e-300)
+    };
+    match &by_filter.foreign {
+        // Sure physics without a name needs to leave no less than a name.
+        Some(foreign) => 1.0 - foreign.share >= left(by_regression),
+        None if by_filter.weighed.named().is_empty() => true,
+        None => left(by_filter) >= CLEARLY_LESS.powi(2) * left(by_regression),
     }
-}
-
-/// The assessment of what shares selected, `with` what they cannot judge or `alone`, whichever has
-/// more of it named; none where nothing is named or what is named lowers no error.
-fn by_selected(prepared: &Prepared, with: Found, alone: Option<Box<Found>>) -> Option<Assessment> {
-    let all = with.standing.materials.len();
-    let assessed = |found| assess::assess(prepared, found).ok();
-    let named = |one: &Assessment| {
-        let is_selected = |i: &&usize| one.weighed.effects[**i].found.material.is_some();
-        one.weighed.named().iter().filter(is_selected).count()
-    };
-    let with = assessed(with);
-    // An effect that a regression cannot judge may occupy the position of a selected one.
-    let is_short = with.as_ref().is_none_or(|one| named(one) < all);
-    let alone = alone.filter(|_| is_short).and_then(|alone| assessed(*alone));
-    let best = match (with, alone) {
-        (Some(with), Some(alone)) if named(&alone) > named(&with) => Some(alone),
-        (with, alone) => with.or(alone),
-    };
-    best.filter(|one| !one.weighed.named().is_empty() && lowers_error(one))
 }
 
 /// True if the named effects together take a material part off the held-out force error.

@@ -81,7 +81,8 @@ fn fitted(
         let unit = if law.in_sensor() {
             1.0
         } else if definition.is_relative_to_gain() {
-            1.0 / ratio
+            // A loss is against the motion, whichever way a command pushes.
+            if definition.is_dry() { 1.0 / ratio.abs() } else { 1.0 / ratio }
         } else {
             inertia
         };
@@ -146,8 +147,8 @@ pub(crate) fn place(nominal: &Nominal, fit: &[BlockedRecording], last: &FittedMo
 fn states(variable: &str, track: &BlockedRecording, turn: Option<f64>) -> Vec<f64> {
     match variable {
         "command" => track.block_mean(&track.rows.command).iter().map(|u| u.abs()).collect(),
-        "travel" => track.motion.x.clone(),
-        "angle" => track.motion.x.iter().map(|x| turn.map_or(*x, |turn| x.rem_euclid(turn))).collect(),
+        "travel" => track.places().collect(),
+        "angle" => track.places().map(|x| turn.map_or(x, |turn| x.rem_euclid(turn))).collect(),
         "time" => track.blocks.start.clone(),
         "tilt" => track.blocks.tilt.clone().unwrap_or_default(),
         _ => track.motion.v.iter().map(|v| v.abs()).collect(),

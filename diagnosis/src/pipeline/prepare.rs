@@ -19,7 +19,6 @@ use crate::io::rig::Rig;
 use crate::selection::candidates::span_of;
 use crate::selection::context::{FitContext, FittedModel};
 use crate::validation::holdout_set::HoldoutSet;
-use crate::validation::plain_selection::PlainSelection;
 use crate::validation::residuals::{drive_force, forces};
 
 /// Rig and recordings before any effect is looked for.
@@ -36,8 +35,6 @@ pub(crate) struct Prepared {
     pub(crate) scale: f64,
     /// Noise under the refitted nominal model.
     pub(crate) noise: Noise,
-    /// The effects that a plain regression finds.
-    pub(crate) plain: PlainSelection,
 }
 
 impl Prepared {
@@ -64,7 +61,6 @@ pub(crate) fn prepare(rig: &Rig, checked: &Checked, skew_rows: Option<f64>, prog
         let scale = refit::acceleration_scale(&nominal, &tracks);
         skew::settle(&mut nominal, &mut tracks, &noise, scale);
     }
-    let plain = PlainSelection::new(rig, nominal.skew_rows.unwrap_or(0.0), nominal.one_way, [fit, holdout]);
     if let Some(rows) = nominal.skew_rows {
         skew::delay_commands(&mut judging, rows);
         (noise, refit) = refit::settle(&mut nominal, &mut tracks);
@@ -84,7 +80,7 @@ pub(crate) fn prepare(rig: &Rig, checked: &Checked, skew_rows: Option<f64>, prog
     for (r, track) in tracks.iter_mut().enumerate() {
         (track.place, track.bias) = (Some(r), first.fit.bias(r));
     }
-    Prepared { given: rig.clone(), nominal, fit: tracks, holdout, span, scale, noise, plain }
+    Prepared { given: rig.clone(), nominal, fit: tracks, holdout, span, scale, noise }
 }
 
 /// Part of the force that a refit may leave for the forces to be in balance.

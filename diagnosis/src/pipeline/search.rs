@@ -45,18 +45,16 @@ pub(crate) struct Found {
     pub(crate) standing: StandingModel,
 }
 
-/// Searches for the effects that explain what the nominal model leaves, other than those that are
-/// `excluded`.
-pub(crate) fn search(prepared: &Prepared, excluded: Vec<RejectedHypothesis>, progress: Progress) -> Found {
+/// Searches for the effects that explain what the nominal model leaves.
+pub(crate) fn search(prepared: &Prepared, progress: Progress) -> Found {
     let search = Search { prepared, progress, done: Cell::new(BEGUN) };
-    let known: Vec<EffectName> = excluded.iter().map(|one| one.name).collect();
-    let mut tried = Tried { rejected: excluded, excluded: known.clone(), ..Tried::default() };
+    let mut tried = Tried::default();
     let grown = search.forward_selection(search.start(), &mut tried);
     search.goes_on("judging on held-out recordings");
     let mut found = search.backward_elimination(grown);
     let removed: Vec<EffectName> = found.standing.rejected.iter().map(|rejected| rejected.name).collect();
     let is_any_removed = !removed.is_empty();
-    tried.excluded = known.into_iter().chain(removed).collect();
+    tried.excluded = removed;
     if !found.standing.effects.is_empty() && is_any_removed {
         // What went may have stood in the place of something else.
         tried.count = 0;

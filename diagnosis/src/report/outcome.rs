@@ -6,6 +6,7 @@ use crate::io::schema::{Both, Contending, FitTable, Hypothesis, Named, Report, U
 use crate::pipeline::diagnosis::{
     Complete, Contender, Diagnosis, JudgedHypothesis, NamedEffect, Reason, Rigs, Series,
 };
+use crate::pipeline::evidence::{self, EvidenceRow};
 use crate::report::{free_form, next_experiment, notes, remains, text};
 use crate::selection::free_form::Shape;
 use crate::simulation::comparison::Comparison;
@@ -53,6 +54,8 @@ pub struct Outcome {
     pub report: Report,
     /// The data that is plotted.
     pub evidence: Evidence,
+    /// What is known of every hypothesis; none where the recordings did not suffice.
+    pub hypotheses: Vec<EvidenceRow>,
     /// The rig as it was given.
     pub nominal_rig: Rig,
     /// The rig with refitted values alone.
@@ -228,8 +231,17 @@ impl Outcome {
             rate_hz,
         };
         let [nominal_rig, refit_rig, patched_rig] = [rig.clone(), rig.clone(), rig.clone()];
-        let contending_rigs = Vec::new();
-        Self { report, evidence, nominal_rig, refit_rig, patched_rig, contending_rigs, made: None }
+        let (contending_rigs, hypotheses) = (Vec::new(), Vec::new());
+        Self {
+            report,
+            evidence,
+            hypotheses,
+            nominal_rig,
+            refit_rig,
+            patched_rig,
+            contending_rigs,
+            made: None,
+        }
     }
 
     fn complete(diagnosis: Complete) -> Self {
@@ -288,7 +300,23 @@ impl Outcome {
             rate_hz: diagnosis.rate_hz,
         };
         let [nominal_rig, refit_rig, patched_rig] = [nominal, refit, patched];
-        Self { report, evidence, nominal_rig, refit_rig, patched_rig, contending_rigs, made: None }
+        let hypotheses = diagnosis.evidence;
+        Self {
+            report,
+            evidence,
+            hypotheses,
+            nominal_rig,
+            refit_rig,
+            patched_rig,
+            contending_rigs,
+            made: None,
+        }
+    }
+
+    /// The evidence for every hypothesis as CSV, one row each, the first for none: what both
+    /// proposers say, in numbers that mean the same on every machine.
+    pub fn hypotheses_csv(&self) -> String {
+        evidence::csv(&self.hypotheses)
     }
 }
 

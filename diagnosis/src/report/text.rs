@@ -6,7 +6,7 @@ use crate::selection::untested::NotTested;
 use crate::thresholds::{CERTAIN_Z, LEAST_SHARE, MATERIAL, SURE_Z, UNLIKELY_Z, UNSURE_SHARE};
 use crate::validation::rejection::{Rather, Rejection, Weakness};
 use numerics::bootstrap::Gain;
-use numerics::digits::{in_sentence, short};
+use numerics::digits::short;
 
 /// Says why an effect is not named, as a clause.
 pub(crate) fn rejection(why: &Rejection) -> String {
@@ -51,8 +51,6 @@ pub(crate) fn rejection(why: &Rejection) -> String {
             "gain and friction would change by the same part, as where the inertia changes".into()
         }
         Rejection::Undecided => "more effects explain it as well than a class may hold".into(),
-        Rejection::NotInPlain { found } => format!("a plain regression finds {} and not this", found.in_words()),
-        Rejection::TakesOtherForce { on_fit, on_holdout } => other_force(*on_fit, *on_holdout),
         Rejection::Improbable { probability, weakness: weakest } => {
             format!("it is right with a probability of only {probability:.2}: {}", weakness(weakest))
         }
@@ -60,6 +58,7 @@ pub(crate) fn rejection(why: &Rejection) -> String {
             format!("the recordings cannot distinguish it from {}", from.in_words())
         }
         Rejection::LessInSearch => "not fitted in full: other effects explained more in the search".into(),
+        Rejection::LeavesMore => "what is named instead leaves less of the force error".into(),
         Rejection::Behind { winner, z } => {
             format!("{} explains more by {z:.1} standard errors", winner.in_words())
         }
@@ -79,14 +78,6 @@ fn immaterial(part: f64) -> String {
         "it takes {:.1} % off the held-out force error, less than the {:.0} % that make it material",
         100.0 * part.max(0.0),
         100.0 * MATERIAL
-    )
-}
-
-fn other_force(on_fit: f64, on_holdout: f64) -> String {
-    format!(
-        "the motion misses {} and {} times the force that it takes from the command, on fitted and held-out recordings",
-        in_sentence(on_fit),
-        in_sentence(on_holdout)
     )
 }
 
@@ -187,8 +178,8 @@ pub(crate) fn reason(why: &Reason, form: Option<&str>) -> String {
             format!("{} would explain {:.0} % of it", foreign.what, 100.0 * foreign.share)
         }
         Reason::FreeForm => return format!("{} would explain it", form.unwrap_or("a force of some form")),
-        Reason::Follows { what, part } => {
-            format!("{what} would explain {:.0} % of it on held-out recordings", 100.0 * part)
+        Reason::Follows { effect, share } => {
+            format!("{} would take {:.0} % of the force error, too little for a name", effect.in_words(), 100.0 * share)
         }
         Reason::Repeats { correlation } => {
             format!("the residual repeats where the motion does, with a correlation of {correlation:.2}")

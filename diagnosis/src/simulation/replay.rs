@@ -79,8 +79,8 @@ impl<'a> Beside<'a> {
     /// The same where the motion is known.
     pub(super) fn in_motion(recording: &'a Recording, motion: Motion, rig: &Rig) -> Self {
         let mut beside = Self { recording, motion, start: 0.0 };
-        if rig.model.gravity.is_some_and(|gravity| gravity != 0.0) {
-            // Its counts have one zero, from which the gravity's angle counts.
+        if rig.encoder.absolute || rig.model.gravity.is_some_and(|gravity| gravity != 0.0) {
+            // Its counts have one zero, from which places and the gravity's angle count.
             beside.start = recording.position_counts[0] / rig.encoder.counts_per_unit;
         } else if let Some(turn) = period(rig) {
             let mut off = |start: f64| {

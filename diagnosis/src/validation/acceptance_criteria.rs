@@ -6,8 +6,8 @@ use crate::thresholds::{
     CERTAIN_Z, FAIR_SHARE, HALF_OF_FORCE, HARDLY_ANOTHER_SIZE, HARMLESS, LEAST_SHARE, MATERIAL, MOST_SHARE,
     NEARLY_ALL_SHARE, PROMISING_Z, SAME_SIZE, SHARE, SURE_Z, UNLIKELY_Z, UNSURE_SHARE, WORSE_Z,
 };
+use crate::validation::material::Material;
 use crate::validation::rejection::Rejection;
-use crate::validation::shares::material::Material;
 use numerics::bootstrap::Gain;
 use std::ops::Range;
 
@@ -183,14 +183,7 @@ impl EffectEvidence {
     /// Returns why an effect that shares of the force error name may not be named, `is_there` if
     /// its size is sure; none if it may. Physics without a name was weighed by shares then.
     pub(crate) fn rejection_by_shares(&self, is_there: bool) -> Option<Rejection> {
-        let beside_noise = self.material.as_ref().is_some_and(|material| material.beside_noise);
-        if !is_there {
-            Some(Rejection::NoSize)
-        } else if beside_noise && self.holdout.sum <= 0.0 {
-            Some(Rejection::LessLikely { nats: -self.holdout.sum })
-        } else {
-            self.immaterial()
-        }
+        if is_there { self.immaterial() } else { Some(Rejection::NoSize) }
     }
 
     /// Returns why an effect may not be named: the first requirement that it does not meet; none if

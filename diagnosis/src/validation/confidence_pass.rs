@@ -229,7 +229,6 @@ impl Scales<'_> {
             is_there: false,
             undecided: false,
             creeps: None,
-            instead: None,
             found,
             evidence,
             parameters,

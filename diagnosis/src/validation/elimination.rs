@@ -7,9 +7,9 @@ use crate::selection::context::{FitContext, FittedModel};
 use crate::validation::acceptance_criteria::EffectEvidence;
 use crate::validation::effect_evidence::gather_evidence;
 use crate::validation::holdout_set::HoldoutSet;
+use crate::validation::material::Material;
 use crate::validation::parameters;
 use crate::validation::rejection::Rejection;
-use crate::validation::shares::material::Material;
 
 /// A hypothesis that was fitted in full and rejected.
 #[derive(Clone)]

@@ -18,14 +18,14 @@ pub(crate) fn known<'a>(
 ) -> Cow<'a, [BlockedRecording]> {
     let follows = |effect: &Effect| effect.name.definition().follows_travel();
     let reach = BEYOND * span.travel();
-    let is_unknown = |x: &f64| *x < span.low - reach || *x > span.high + reach;
-    let goes_beyond = |track: &BlockedRecording| track.motion.x.iter().any(is_unknown);
+    let is_unknown = |x: f64| x < span.low - reach || x > span.high + reach;
+    let goes_beyond = |track: &BlockedRecording| track.places().any(is_unknown);
     if !model.effects.iter().any(follows) || !tracks.iter().any(goes_beyond) {
         return Cow::Borrowed(tracks);
     }
     let mut tracks = tracks.to_vec();
     for track in &mut tracks {
-        track.unknown = track.motion.x.iter().map(is_unknown).collect();
+        track.unknown = track.places().map(is_unknown).collect();
     }
     Cow::Owned(tracks)
 }
@@ -54,7 +54,7 @@ pub(crate) fn beyond(tracks: &[BlockedRecording], model: &Model, span: &Span) ->
     if !known.iter().any(is_told) {
         return None;
     }
-    let all = || known.iter().flat_map(|track| track.motion.x.iter().copied());
+    let all = || known.iter().flat_map(BlockedRecording::places);
     let (from, to) = (all().fold(span.low, f64::min), all().fold(span.high, f64::max));
     Some(BeyondFitted { from, to, low: span.low, high: span.high })
 }

@@ -49,17 +49,14 @@ pub(crate) enum Rejection {
     InertiaChanges,
     /// More effects explain it as well than a class may hold.
     Undecided,
-    /// A plain regression of the force finds another effect, which is named, and not this one.
-    NotInPlain { found: EffectName },
-    /// The force that it takes from the recorded command is these times what the motion misses, on
-    /// fitted and on held-out recordings.
-    TakesOtherForce { on_fit: f64, on_holdout: f64 },
     /// The probability that it is right is too small.
     Improbable { probability: f64, weakness: Weakness },
     /// The recordings cannot distinguish it from a named effect.
     Indistinguishable { from: EffectName },
     /// The search finds more in others.
     LessInSearch,
+    /// The model that it is in leaves more of the force error than the one that is named.
+    LeavesMore,
     /// Another effect explains more instead.
     Behind { winner: EffectName, z: f64 },
 }

@@ -27,8 +27,8 @@ const LEAST: usize = 20;
 fn variable(track: &BlockedRecording, name: &str, turn: Option<f64>) -> Vec<f64> {
     match name {
         "speed" => track.motion.v.clone(),
-        "travel" => track.motion.x.clone(),
-        "angle" => track.motion.x.iter().map(|x| turn.map_or(0.0, |turn| x.rem_euclid(turn))).collect(),
+        "travel" => track.places().collect(),
+        "angle" => track.places().map(|x| turn.map_or(0.0, |turn| x.rem_euclid(turn))).collect(),
         "command" => track.block_mean(&track.rows.command),
         _ => track.blocks.start.clone(),
     }

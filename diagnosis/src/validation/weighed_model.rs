@@ -11,8 +11,8 @@ use crate::validation::comparison::Shown;
 use crate::validation::confidence::{self, Evidence};
 use crate::validation::contradictions::{are_alike, same_joint};
 use crate::validation::elimination::RejectedHypothesis;
+use crate::validation::material::Material;
 use crate::validation::rejection::{Rather, Rejection};
-use crate::validation::shares::material::Material;
 use crate::validation::tonal::TonalDisturbance;
 use std::collections::BTreeMap;
 
@@ -28,8 +28,6 @@ pub(crate) struct WeighedEffect {
     pub(crate) undecided: bool,
     /// Part of the travel over which it bends, where that is more than bristles bend.
     pub(crate) creeps: Option<f64>,
-    /// The effect that a plain regression finds, where that is named and this one is not found.
-    pub(crate) instead: Option<EffectName>,
     /// The better explanation, where something without a name explains significantly more.
     pub(crate) rather: Option<Rather>,
 }
@@ -121,6 +119,22 @@ impl WeighedModel {
         }
     }
 
+    /// Takes this model's names and not another's: a name of both is as sure as the surer, and what
+    /// only the other has is rejected.
+    pub(crate) fn is_beside(&mut self, other: &Self) {
+        let named: Vec<&WeighedEffect> = other.named().into_iter().map(|i| &other.effects[i]).collect();
+        for one in &mut self.effects {
+            let same = named.iter().filter(|other| other.class.contains(&one.found.effect.name));
+            one.confidence = same.fold(one.confidence, |most, other| most.max(other.confidence));
+        }
+        let rejected = other.effects.iter().chain(&other.dropped).map(|one| RejectedHypothesis {
+            name: one.found.effect.name,
+            holdout_gain: Some(one.found.holdout.sum),
+            why: other.doubt(one).unwrap_or(Rejection::LeavesMore),
+        });
+        self.rejected.splice(..0, rejected);
+    }
+
     /// Places of the effects that are named.
     pub(crate) fn named(&self) -> Vec<usize> {
         let is_named = |(i, effect): (usize, &WeighedEffect)| self.doubt(effect).is_none().then_some(i);
@@ -158,9 +172,6 @@ impl WeighedModel {
     fn contradiction(&self, assessed: &WeighedEffect) -> Option<Rejection> {
         if let Some(from) = self.twin_beside(assessed) {
             return Some(Rejection::Indistinguishable { from });
-        }
-        if let Some(found) = assessed.instead {
-            return Some(Rejection::NotInPlain { found });
         }
         if assessed.found.material.is_some() {
             return assessed.found.rejection_by_shares(assessed.is_there);

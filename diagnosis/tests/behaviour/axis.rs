@@ -172,7 +172,7 @@ pub fn rig(model: &str, encoder: &str, actuator: &str, counts: f64) -> Rig {
 
 pub fn diagnosed(rig: &Rig, fit: &[Recording], holdout: &[Recording]) -> Outcome {
     let outcome = diagnose_recordings(rig, fit, holdout, &|_, _| ()).expect("the recordings are usable");
-    println!("{}", outcome.summary());
+    println!("{}\n{}", outcome.summary(), outcome.hypotheses_csv());
     outcome
 }
 

@@ -12,7 +12,10 @@ fn setup(effect: &'static str) -> Setup {
 }
 
 fn run(rig: &Rig, setup: &Setup) -> Outcome {
-    diagnose_recordings(rig, &[record(setup, 1)], &[record(setup, 2)], &|_, _| ()).expect("usable")
+    let outcome =
+        diagnose_recordings(rig, &[record(setup, 1)], &[record(setup, 2)], &|_, _| ()).expect("usable");
+    println!("{}\n{}", outcome.summary(), outcome.hypotheses_csv());
+    outcome
 }
 
 const OFFSET: &str = "offset = 0.0";
@@ -187,36 +190,34 @@ fn a_load_step_is_no_drift_and_the_report_names_its_likeness() {
     }
 }
 
+/// The plant loses this part of the drive's force against the motion.
 #[test]
-fn a_lossy_gear_is_no_effect_of_the_library() {
-    let mut as_gear = 0;
-    for (closed, size, why) in
-        [(false, 2.0, "it resembles"), (false, 0.6, "would explain 99 %"), (true, 1.2, "would explain 100 %")]
-    {
-        for seed in [5, 6] {
-            let outcome = run(&rig(OFF, OFFSET), &Setup { closed, size, seed, ..setup("gear_loss") });
-            assert!(outcome.report.effects.is_empty(), "{}", outcome.summary());
-            assert_eq!(outcome.report.verdict, Verdict::Unexplained, "{}", outcome.summary());
-            // Where nothing like it is found first, it is reported by its inputs alone.
-            let told = outcome.report.sentence;
-            let is_gear = told.contains("as a gear loses it") && told.contains(why);
-            assert!(is_gear || told.contains("a force that swings with command"), "{told}");
-            as_gear += u32::from(is_gear);
-        }
+fn a_lossy_gear_is_named_with_its_fraction() {
+    for (closed, size) in [(false, 2.0), (false, 0.6), (true, 1.2)] {
+        let setup = Setup { closed, size, ..setup("gear_loss") };
+        let outcome = run(&rig(OFF, OFFSET), &setup);
+        let loss = outcome.report.effects.iter().find(|one| one.name.as_str() == "drive_loss");
+        let loss = loss.unwrap_or_else(|| panic!("{}", outcome.summary()));
+        // The plant's command is less its part of the loss.
+        let fraction = loss.parameters["fraction"].value;
+        assert!((fraction / (0.25 * size) - 1.0).abs() < 0.25, "{size}: {fraction}");
     }
-    assert!(as_gear >= 4, "{as_gear} of 6 are reported as a gear's");
 }
 
 #[test]
 fn a_nameless_force_is_reported_where_it_explains_most() {
-    for (effect, seed, told) in [
-        ("creeping_spring", 5, "a spring that creeps, whose force fades within 0.6 s, would explain 99 %"),
-        ("heavier_load", 6, "a load that changes at once, at 5.4 s, would explain"),
-    ] {
-        let outcome = run(&rig(OFF, OFFSET), &Setup { size: 0.3, seed, ..setup(effect) });
-        assert!(outcome.report.effects.is_empty(), "{}", outcome.summary());
-        assert!(outcome.report.sentence.contains(told), "{}", outcome.report.sentence);
-    }
+    let outcome = run(&rig(OFF, OFFSET), &Setup { size: 0.3, seed: 5, ..setup("creeping_spring") });
+    assert!(outcome.report.effects.is_empty(), "{}", outcome.summary());
+    let told = "a spring that creeps, whose force fades within 0.6 s, would explain 99 %";
+    assert!(outcome.report.sentence.contains(told), "{}", outcome.report.sentence);
+}
+
+/// Drifts of gain and friction leave nearly as little, so that they may be named, and not surely.
+#[test]
+fn a_load_that_changes_at_once_is_never_surely_named() {
+    let outcome = run(&rig(OFF, OFFSET), &Setup { size: 0.3, seed: 6, ..setup("heavier_load") });
+    let surest = outcome.report.effects.iter().map(|one| one.confidence).fold(0.0, f64::max);
+    assert!(surest < 0.9, "{}", outcome.summary());
 }
 
 #[test]

@@ -27,6 +27,7 @@ use case::{Drawn, Ground};
 use judge::Case;
 use untouched::Untouched;
 
+use crate::evidence;
 use crate::options::Options;
 use crate::pool;
 use crate::rng::Rng;
@@ -212,6 +213,7 @@ fn run_case(
     let start = Instant::now();
     let answer = tool::ask(tool, &paths, &out);
     let seconds = start.elapsed().as_secs_f64();
+    evidence::collect(options, [&id, &chosen.place.machine], &[wish.hidden], &out)?;
     let report = std::fs::read_to_string(out.join("diagnosis.json")).ok();
     let report = report.and_then(|text| serde_json::from_str(&text).ok()).unwrap_or_default();
     let plain = |carrier: &Carrier| {

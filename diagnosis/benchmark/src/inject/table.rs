@@ -268,15 +268,6 @@ pub(crate) fn json(first: &str, cases: &[&Case]) -> Value {
                 json!({ "name": n.name, "class": n.class, "confidence": n.confidence, "right": right, "believed": believed })
             })
             .collect();
-        let weighed: Vec<Value> = c
-            .answer
-            .iter()
-            .flat_map(|a| &a.weighed)
-            .map(|w| {
-                let right = w.name == c.hidden || w.class.iter().any(|n| n == c.hidden);
-                json!({ "name": w.name, "right": right, "evidence": w.evidence })
-            })
-            .collect();
         json!({
             "id": c.id, "kind": "effect", "carrier": c.carrier, "machine": c.machine, "hidden": c.hidden,
             "strength": c.factor, "size": c.size, "solvable": c.oracle.solves(),
@@ -284,7 +275,7 @@ pub(crate) fn json(first: &str, cases: &[&Case]) -> Value {
             "said": format!("{:?}", c.said()).to_lowercase(), "names": names, "answer": answer(c),
             "lost": c.lost.word(), "rejected_because": c.lost.reason(), "plain": list(&c.plain), "plain_untouched": list(&c.plain_own),
             "own": c.own.iter().map(|n| n.name.clone()).collect::<Vec<_>>(),
-            "seconds": c.seconds, "weighed": weighed,
+            "seconds": c.seconds,
         })
     };
     json!({ "format": 1, "source": first, "cases": cases.iter().map(one).collect::<Vec<_>>() })

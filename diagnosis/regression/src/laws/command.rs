@@ -20,7 +20,7 @@ const fn law(
 }
 
 /// The laws, as maps from the force û to what has to be commanded beyond it.
-pub(super) static LAWS: [Law; 5] = [
+pub(super) static LAWS: [Law; 6] = [
     law(
         "command_deadband",
         "w·clip(û/x, ±1)",
@@ -47,6 +47,10 @@ pub(super) static LAWS: [Law; 5] = [
         drift_shapes,
         drift,
     ),
+    Law {
+        refines: Some("coulomb_friction"),
+        ..law("drive_loss", "f·|û|·sgn q̇", "", Size::Positive, loss_shapes, loss)
+    },
 ];
 
 /// Returns the force that the motion asks for: least squares of the recorded force on functions of
@@ -159,6 +163,15 @@ fn lag_shapes(m: &Machine) -> Vec<Shape> {
 }
 fn lag(m: &Machine, i: usize, _: &Shape) -> Vec<Vec<f64>> {
     vec![derivative(&m.asked[i], m.states[i].h)]
+}
+
+/// A loss in proportion to the force that the motion asks for, as a gear has.
+fn loss_shapes(m: &Machine) -> Vec<Shape> {
+    if_driven(m, vec![Shape::fixed("", 0.0)])
+}
+fn loss(m: &Machine, i: usize, _: &Shape) -> Vec<Vec<f64>> {
+    let (s, u) = (&m.states[i], &m.asked[i]);
+    vec![s.each(|k| u[k].abs() * s.direction[k])]
 }
 
 fn drift_shapes(m: &Machine) -> Vec<Shape> {

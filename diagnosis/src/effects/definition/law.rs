@@ -100,12 +100,6 @@ pub(crate) trait EffectLaw: Sync {
         false
     }
 
-    /// True if its force is in proportion to the drive's, which is what a fit of shares is to
-    /// explain.
-    fn follows_drive(&self, _effect: &Effect) -> bool {
-        false
-    }
-
     /// True if it changes with the time of the recording.
     fn drifts(&self) -> bool {
         false

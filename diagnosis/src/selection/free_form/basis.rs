@@ -100,7 +100,7 @@ pub(crate) fn points(track: &BlockedRecording) -> Vec<Point> {
             Point {
                 direction: if track.motion.rest[j] { 0.0 } else { v.signum() },
                 speed: v.abs(),
-                travel: track.motion.x[j],
+                travel: track.place_at(j),
                 passed: v * track.blocks.span[j],
                 command: command[j],
                 since_reversal: time - turned,

@@ -6,7 +6,7 @@ mod compare;
 mod evaluate;
 mod shape;
 
-pub(crate) use basis::{Basis, Inputs, Warps, points};
+pub(crate) use basis::Inputs;
 pub(crate) use compare::{Taken, is_told};
 pub(crate) use evaluate::Evaluator;
 pub(crate) use shape::Shape;

@@ -29,20 +29,6 @@ fn may_be_named(change: impl FnOnce(&mut EffectEvidence)) -> bool {
 }
 
 #[test]
-fn with_noise_a_share_needs_a_held_out_gain_too() {
-    let by_share = |beside_noise, held_out| {
-        let (name, class) = (EffectName::FrictionDrift, Vec::new());
-        let material = Some(Material { name, share: 0.3, class, beside_noise });
-        EffectEvidence { material, holdout: gain(held_out, 0.0, 1.0), ..found() }
-    };
-    let less_likely = by_share(true, -2.5);
-    assert_eq!(less_likely.rejection_by_shares(true), Some(Rejection::LessLikely { nats: 2.5 }));
-    assert_eq!(by_share(false, -2.5).rejection_by_shares(true), None, "other physics limits there");
-    assert_eq!(by_share(true, 2.5).rejection_by_shares(true), None);
-    assert_eq!(by_share(true, 2.5).rejection_by_shares(false), Some(Rejection::NoSize));
-}
-
-#[test]
 fn a_gain_from_few_moments_must_be_large_everywhere() {
     let rare = |found: &mut EffectEvidence| {
         found.holdout = gain(500.0, -60.0, 1.6);
@@ -222,4 +208,5 @@ fn an_effect_that_takes_less_than_a_twentieth_is_not_named() {
     assert_eq!(part(0.06).immaterial(), None);
     let by_share = |off_force| part(off_force).rejection_by_shares(true);
     assert_eq!((by_share(0.04), by_share(0.06)), (Some(Rejection::Immaterial { part: 0.04 }), None));
+    assert_eq!(part(0.06).rejection_by_shares(false), Some(Rejection::NoSize));
 }

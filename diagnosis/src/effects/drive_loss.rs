@@ -1,0 +1,67 @@
+//! A loss in proportion to the drive's own force, as a gear or a screw has: `-fraction·|drive|·sgn(q̇)`.
+
+use super::definition::{Allowed, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Reported, Span};
+use super::law::sign;
+use super::{Effect, EffectName, State, Subsystem};
+
+#[derive(Debug, Clone)]
+struct DriveLossLaw;
+
+impl ForceLaw for DriveLossLaw {
+    fn names(&self) -> Vec<String> {
+        vec!["fraction".into()]
+    }
+    fn terms(&mut self, state: &State, velocity: f64, out: &mut [f64]) {
+        out[0] = -sign(velocity) * state.drive.abs();
+    }
+    fn copy(&self) -> Box<dyn ForceLaw> {
+        Box::new(self.clone())
+    }
+}
+
+pub(super) struct Defined;
+
+impl EffectLaw for Defined {
+    fn law(&self, _effect: &Effect) -> Option<Box<dyn ForceLaw>> {
+        Some(Box::new(DriveLossLaw))
+    }
+    fn reads_command(&self, _effect: &Effect) -> bool {
+        true
+    }
+    fn is_relative_to_gain(&self) -> bool {
+        true
+    }
+    fn is_dry(&self) -> bool {
+        true
+    }
+}
+
+impl EffectSearch for Defined {
+    fn needs_changing_command(&self) -> bool {
+        true
+    }
+    fn grid(&self, name: EffectName, _span: &Span) -> Vec<Effect> {
+        vec![Effect::shaped(name, &[])]
+    }
+    fn limits(&self, _term: usize, allowed: &Allowed) -> (f64, f64) {
+        // A drive that loses more does not move its axis.
+        (0.0, 0.9 * allowed.gain.abs() * allowed.gain_reach)
+    }
+}
+
+impl EffectReport for Defined {
+    fn subsystem(&self) -> Subsystem {
+        Subsystem::Transmission
+    }
+    fn words(&self) -> &'static str {
+        "a loss in proportion to the drive's own force, as a gear has"
+    }
+    fn report(&self, fitted: &Fitted) -> Vec<Reported> {
+        let (loss, sd) = fitted.term(0);
+        let ratio = fitted.ratio.abs();
+        vec![Reported::new("fraction", (loss / ratio, sd / ratio), "1")]
+    }
+    fn form_sd(&self, _value: &str) -> f64 {
+        0.03
+    }
+}

@@ -1,0 +1,81 @@
+//! The third stage: what the regression names, fitted by the filter. No likelihood rejects it.
+
+use super::prepare::Prepared;
+use super::search::{Found, in_its_own_motion};
+use crate::effects::definition::Shown;
+use crate::effects::{Effect, EffectName};
+use crate::estimation::model::Model;
+use crate::estimation::noise::Colour;
+use crate::io::rig::Kind;
+use crate::selection::context::{FitContext, FittedModel};
+use crate::selection::excitation::Excitation;
+use crate::thresholds::MOST_IN_CLASS;
+use crate::validation::effect_evidence::gather_evidence;
+use crate::validation::elimination::StandingModel;
+use crate::validation::material::{self, Material};
+use regression::Hypothesis;
+
+/// The recordings with the effects that the regression names; none where it names nothing that the
+/// filter can see.
+pub(crate) fn by_regression(prepared: &Prepared, found: &Found, rounds: &[Vec<Hypothesis>]) -> Option<Found> {
+    let context = prepared.context(&prepared.fit);
+    let mut model = context.fit(Model::default(), &prepared.noise, Colour::White);
+    let shown = shown(prepared, found);
+    let mut materials = Vec::new();
+    for mut material in material::named(rounds) {
+        // The regression may not tell its name from one that the filter can fit.
+        let fitted = material.class.iter().find_map(|name| with_effect(&context, &model, *name));
+        let Some(fitted) = fitted else { continue };
+        model = fitted;
+        let effect = model.model.effects.last().expect("one was added");
+        material.name = effect.name;
+        let twins = material.name.definition().twins(effect, &shown);
+        material.class = class_of(material.name, twins, material.class);
+        materials.push(material);
+    }
+    (!materials.is_empty()).then(|| standing(prepared, found, model, materials))
+}
+
+/// A model with one more effect, in the shape that fits best; none where the filter cannot see it.
+fn with_effect(context: &FitContext, now: &FittedModel, name: EffectName) -> Option<FittedModel> {
+    let best: Vec<(Effect, f64)> = context.screen(now, &|other| other == name).into_iter().take(1).collect();
+    let mut finalists = context.finalists(now, &best);
+    context.polish(&mut finalists);
+    finalists.into_iter().next()
+}
+
+/// Returns the facts about the axis that the recordings show.
+fn shown(prepared: &Prepared, found: &Found) -> Shown {
+    let (count, rig) = (prepared.span.count, &prepared.nominal.rig);
+    let excitation = Excitation::of(&found.fit, count, rig.turn()).shown();
+    Shown { one_way: prepared.span.one_way, linear: rig.kind == Kind::Linear, count, ..excitation }
+}
+
+/// A class that begins with a name of it, followed by the effects that no such recordings
+/// distinguish from that name.
+fn class_of(name: EffectName, twins: Vec<EffectName>, near: Vec<EffectName>) -> Vec<EffectName> {
+    let mut class = vec![name];
+    for other in near.into_iter().chain(twins) {
+        if class.len() < MOST_IN_CLASS && !class.contains(&other) {
+            class.push(other);
+        }
+    }
+    class
+}
+
+/// The found recordings with another model.
+fn standing(prepared: &Prepared, found: &Found, first: FittedModel, materials: Vec<Material>) -> Found {
+    let context = prepared.context(&prepared.fit);
+    let (fit, white) = in_its_own_motion(&prepared.fit, first, &context);
+    let own = prepared.context(&fit);
+    let mut holdout = prepared.holdout.clone();
+    holdout.follow(&white, &prepared.nominal, &prepared.span, prepared.scale);
+    let model = own.fit_in_band(white);
+    let null = own.fit_at(Model::default(), &model.noise);
+    let mut evidence = gather_evidence(&own, &model, &model.noise, &holdout);
+    for one in &mut evidence {
+        one.material = Material::find(&materials, one.effect.name).cloned();
+    }
+    let rejected = found.standing.rejected.clone();
+    Found { fit, holdout, null, standing: StandingModel { model, effects: evidence, rejected, materials } }
+}

@@ -1,0 +1,145 @@
+//! The evidence table: what both proposers say of every hypothesis, named or not, in the same
+//! numbers on every machine. Nothing here decides.
+
+use super::assess::Assessment;
+use crate::effects::EffectName;
+use crate::io::schema::Simulation;
+use crate::validation::weighed_model::WeighedEffect;
+use regression::Hypothesis;
+use std::fmt::Write as _;
+
+/// The numbers of a row, in their order; empty where neither proposer has one.
+pub(crate) const COLUMNS: [&str; 13] = [
+    // The filter: gain on held-out recordings, nats, and its mean over its standard error.
+    "filter_gain",
+    "filter_z",
+    // The regression: share of the force error and its z, on left-out frames of the fit and on
+    // held-out recordings.
+    "share",
+    "z",
+    "held_share",
+    "held_z",
+    // Agreement of the size in two halves of the fit and on held-out recordings, the smaller one.
+    "size_agreement",
+    // Standard errors ahead of the next law; negative: behind the first.
+    "lead_z",
+    // Share that a smooth force of any form takes beyond the law.
+    "free_form_more",
+    // Force error after the law over the noise of the readings, and degrees of freedom.
+    "residual_over_noise",
+    "rows",
+    // Logarithm of the error of the patched simulation over the refitted one's, in windows of 0.1
+    // and 0.5 s; of named effects.
+    "motion_0_1_s",
+    "motion_0_5_s",
+];
+
+/// What is known of one hypothesis; `none` is the hypothesis that nothing is missing.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EvidenceRow {
+    name: &'static str,
+    is_named: bool,
+    numbers: [Option<f64>; COLUMNS.len()],
+}
+
+/// The rows of every effect that a proposer looked at, `none` first.
+pub(crate) fn rows(
+    assessment: &Assessment,
+    rounds: &[Vec<Hypothesis>],
+    motion: Option<&Simulation>,
+) -> Vec<EvidenceRow> {
+    let weighed = &assessment.weighed;
+    let named: Vec<EffectName> =
+        weighed.named().into_iter().map(|i| weighed.effects[i].found.effect.name).collect();
+    let filter: Vec<&WeighedEffect> = weighed.effects.iter().chain(&weighed.dropped).collect();
+    let row = |name: &EffectName| {
+        let seen = filter.iter().find(|one| one.found.effect.name == *name).map(|one| one.found.holdout);
+        let less = weighed.rejected.iter().find(|one| one.name == *name).and_then(|one| one.holdout_gain);
+        // What leads a round is judged beside the laws before it, the rest beside none.
+        let is_law = |one: &&Hypothesis| one.law.name == name.as_str();
+        let leaders = || rounds.iter().filter_map(|round| round.first());
+        let law = leaders().find(is_law).or_else(|| rounds.iter().flatten().find(is_law));
+        let is_named = named.contains(name);
+        let windows =
+            motion.filter(|_| is_named).map_or([None; 2], |motion| [0.1, 0.5].map(|s| off(motion, s)));
+        let filter = [seen.map(|gain| gain.sum).or(less), seen.map(|gain| gain.z)];
+        let numbers = joined(filter, law.map_or([None; 9], of_law), windows);
+        (numbers.iter().any(Option::is_some)).then_some(EvidenceRow {
+            name: name.as_str(),
+            is_named,
+            numbers,
+        })
+    };
+    let first = rounds.first().and_then(|round| round.first());
+    let none = EvidenceRow { name: "none", is_named: named.is_empty(), numbers: of_none(first) };
+    std::iter::once(none).chain(EffectName::ALL.iter().filter_map(row)).collect()
+}
+
+fn joined(filter: [Option<f64>; 2], law: [Option<f64>; 9], windows: [Option<f64>; 2]) -> [Option<f64>; 13] {
+    let mut all = filter.into_iter().chain(law).chain(windows);
+    std::array::from_fn(|_| all.next().flatten())
+}
+
+fn of_law(one: &Hypothesis) -> [Option<f64>; 9] {
+    let e = &one.evidence;
+    let agreement = e.held_out.map_or(e.size_agreement, |held| held.size_agreement.min(e.size_agreement));
+    [
+        Some(e.share),
+        Some(e.z),
+        e.held_out.map(|held| held.share),
+        e.held_out.map(|held| held.z),
+        Some(if one.valid { agreement } else { 0.0 }),
+        Some(e.lead_z),
+        Some(e.free_form_more),
+        Some(e.residual_over_noise),
+        Some(e.rows),
+    ]
+}
+
+/// Nothing gains nothing; what it leaves is what the first law leaves and takes.
+fn of_none(first: Option<&Hypothesis>) -> [Option<f64>; 13] {
+    let e = first.map(|one| one.evidence);
+    let left = e.map(|e| e.residual_over_noise / (1.0 - e.share).max(1e-3));
+    let zero = Some(0.0);
+    joined([zero; 2], [zero, zero, zero, zero, None, None, None, left, e.map(|e| e.rows)], [zero; 2])
+}
+
+/// Logarithm of the patched over the refitted simulation's error in windows of so many seconds.
+fn off(motion: &Simulation, seconds: f64) -> Option<f64> {
+    let window = motion.windows.iter().find(|window| window.seconds == seconds)?;
+    Some((window.position.patched? / window.position.refit?).ln())
+}
+
+/// The table as CSV, with a header.
+pub(crate) fn csv(rows: &[EvidenceRow]) -> String {
+    let mut out = format!("hypothesis,named,{}\n", COLUMNS.join(","));
+    for row in rows {
+        let _ = write!(out, "{},{}", row.name, u8::from(row.is_named));
+        for number in row.numbers {
+            out.push(',');
+            if let Some(x) = number.filter(|x| x.is_finite()) {
+                let _ = write!(out, "{x:.6e}");
+            }
+        }
+        out.push('\n');
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_table_has_a_number_for_every_column_or_a_gap() {
+        let mut numbers = [None; COLUMNS.len()];
+        (numbers[0], numbers[12]) = (Some(3.5), Some(-0.25));
+        let text = csv(&[EvidenceRow { name: "backlash", is_named: true, numbers }]);
+        let lines: Vec<Vec<&str>> = text.lines().map(|line| line.split(',').collect()).collect();
+        assert_eq!(lines[0].len(), lines[1].len());
+        let at = |column: &str| lines[1][lines[0].iter().position(|name| *name == column).expect("a column")];
+        assert_eq!((at("hypothesis"), at("named"), at("share")), ("backlash", "1", ""));
+        let number = |column: &str| at(column).parse::<f64>().expect("a number");
+        assert_eq!((number("filter_gain"), number("motion_0_5_s")), (3.5, -0.25));
+    }
+}
