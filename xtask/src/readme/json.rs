@@ -50,7 +50,7 @@ pub(super) fn parse(text: &str) -> Result<Json, usize> {
     value.filter(|_| reader.rest.is_empty()).ok_or_else(|| 1 + text[..read].matches('\n').count())
 }
 
-/// What of a text is not read yet.
+/// The part of a text that is not read yet.
 struct Reader<'a> {
     rest: &'a str,
 }

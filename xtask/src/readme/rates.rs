@@ -74,7 +74,7 @@ impl Row {
     fn add_tool(&mut self, case: &Json) -> Option<()> {
         self.add(case, case.get("said").text()? == "found")?;
         for name in case.get("names").list()? {
-            let is_right = name.get("right").bool()? || name.get("believed").bool()?;
+            let is_right = name.get("right").bool()? | name.get("believed").bool()?;
             self.wrong.add(!is_right);
             if name.get("confidence").number()? >= SURE {
                 self.sure.add(is_right);
@@ -131,8 +131,8 @@ pub(super) fn table(cases: &[Json], believed: &Believed) -> Result<String, Strin
         add().ok_or_else(|| case.get("id").text().unwrap_or("without an id").to_string())?;
     }
     let mut table = format!(
-        "| {} effects concealed in recordings of {} real machines | found at 3 × | found at 1 × | false names | right of the names of \
-         {SURE} or more |\n|{}\n",
+        "| {} effects concealed in recordings of {} real machines | found at 3 × | found at 1 × | false names | right among names \
+         ≥ {SURE} |\n|{}\n",
         cases.len(),
         machines.len(),
         " --- |".repeat(5)
@@ -175,7 +175,7 @@ mod tests {
             rows(CASE),
             [
                 "| `host-sim diagnose` | 100 % (1 of 1, 21–100) | – | 50 % (2 of 4, 15–85) | 67 % (2 of 3, 21–94) |",
-                // The lag is the machine's own, the friction is believed, the cogging neither from 15 %.
+                // From 15 %, only the lag is the machine's own; the friction is believed.
                 "| a plain regression, from 15 % of the force | 0 % (0 of 1, 0–79) | – | 50 % (1 of 2, 9–91) | – |",
                 "| a plain regression, from 5 % of the force | 100 % (1 of 1, 21–100) | – | 0 % (0 of 2, 0–66) | – |",
             ]
