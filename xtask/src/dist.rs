@@ -36,17 +36,19 @@ pub(crate) fn run() -> Result<(), Error> {
 }
 
 /// The first eight digits of the commit's hash, with a `+` if the sources differ from it.
-fn commit() -> Result<String, Error> {
+pub(crate) fn commit() -> Result<String, Error> {
     let git = |arguments: &[&str]| {
         Command::new("git").args(arguments).current_dir(shell::top()).output().map_err(|error| {
-            Error::new(format!("git could not be started: {error}; install it, the images name their commit"))
+            Error::new(format!(
+                "git could not be started: {error}; install it, what is made here names its commit"
+            ))
         })
     };
     let hash = git(&["rev-parse", "HEAD"])?;
     let text = String::from_utf8_lossy(&hash.stdout);
     let Some(hash) = text.get(..8).filter(|_| hash.status.success()) else {
         return Err(Error::new(
-            "this is not a git checkout: clone the repository, the images name their commit",
+            "this is not a git checkout: clone the repository, what is made here names its commit",
         ));
     };
     let is_changed = !git(&["status", "--porcelain"])?.stdout.is_empty();

@@ -17,6 +17,7 @@ mod firmware;
 mod flash;
 mod mutants;
 mod python;
+mod readme;
 mod real_recordings;
 mod rows;
 mod setup;
@@ -58,6 +59,8 @@ The project's chores.
                                 --against PROGRAM|REVISION; without it the commit of a day ago; other flags as `prove` has them
   cargo xtask mutants [CRATE…]  changes the code a thousand times and sees that the tests notice: half an hour
   cargo xtask prove [FLAGS…]    the blinded proof of the diagnosis; flags as `cargo xtask prove --help` says
+  cargo xtask readme --from target/inject.json
+                                writes the README's table from what `prove --inject` measured
   cargo xtask help              this text
 
 Example: cargo xtask test fmt unit";
@@ -86,6 +89,7 @@ fn main() -> ExitCode {
         "mutants" => mutants::run(rest),
         "bench" => bench::run(rest),
         "counts" => counts::run(rest),
+        "readme" => readme::run(rest),
         other => {
             Err(Error::usage(format!("`{other}` is not a command of xtask; `cargo xtask help` lists them")))
         }

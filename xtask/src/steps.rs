@@ -5,7 +5,8 @@ use crate::setup::{self, Toolchain};
 use crate::shell::{self, Error, cargo};
 use crate::workspace_build::{ANY_RUST, BUILD, OWN_COMPILER, built};
 use crate::{
-    answers, arrows, board_test, counts, firmware, mutants, python, real_recordings, site, wasm, words,
+    answers, arrows, board_test, counts, firmware, mutants, python, readme, real_recordings, site, wasm,
+    words,
 };
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -29,7 +30,7 @@ pub(crate) struct TestStep {
 /// In the order that finds the most for the least time.
 pub(crate) const STEPS: [TestStep; 14] = [
     step("fmt", "the sources are formatted", 3.0, fmt),
-    step("words", "comments and documents are in plain English", 2.0, words::check),
+    step("words", "comments and documents are in plain English", 2.0, text),
     step(
         "arrows",
         "no files of a crate use each other in a circle; no function over 60 lines",
@@ -57,7 +58,7 @@ pub(crate) const STEPS: [TestStep; 14] = [
 /// The inner loop.
 pub(crate) const QUICK: [TestStep; 5] = [
     step("fmt", "the sources are formatted", 3.0, fmt),
-    step("words", "comments and documents are in plain English", 2.0, words::check),
+    step("words", "comments and documents are in plain English", 2.0, text),
     step(
         "arrows",
         "no files of a crate use each other in a circle; no function over 60 lines",
@@ -103,6 +104,11 @@ const fn step(
 
 fn fmt() -> Result<(), Error> {
     shell::run(cargo().args(["fmt", "--all", "--check"]))
+}
+
+fn text() -> Result<(), Error> {
+    words::check()?;
+    readme::check()
 }
 
 /// By clippy where it is installed, which compiles as it checks.
