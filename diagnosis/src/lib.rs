@@ -56,6 +56,11 @@ pub struct Request {
 /// fraction done.
 pub fn diagnose(request: &Request, progress: &(dyn Fn(&str, f64) + Sync)) -> Result<Outcome, InputError> {
     progress("reading", 0.0);
+    let (rig, fit, holdout) = read_all(request)?;
+    diagnose_recordings(&rig, &fit, &holdout, progress)
+}
+
+fn read_all(request: &Request) -> Result<(Rig, Vec<Recording>, Vec<Recording>), InputError> {
     if request.fit.is_empty() || request.holdout.is_empty() {
         return Err(InputError::new("at least one recording to fit and one to hold out are needed"));
     }
@@ -71,13 +76,31 @@ pub fn diagnose(request: &Request, progress: &(dyn Fn(&str, f64) + Sync)) -> Res
         |paths: &[PathBuf]| paths.iter().map(|path| Recording::read(path)).collect::<Result<Vec<_>, _>>();
     let (fit, holdout) = (read(&request.fit)?, read(&request.holdout)?);
     io::sets::check(&rig, &fit, &holdout)?;
-    diagnose_recordings(&rig, &fit, &holdout, progress)
+    Ok((rig, fit, holdout))
 }
 
 /// The faults of recordings that are seen before any law is searched, as a diagnosis takes them
 /// out.
 pub fn data_faults(rig: &Rig, fit: &[Recording], holdout: &[Recording]) -> Vec<DataFault> {
     data_faults::check(rig, fit, holdout).faults
+}
+
+/// Reads the files and says what they can and cannot show, a sentence each, before any effect is
+/// looked for: rate, resolution, faults of the log, what cannot be told apart, effects that cannot
+/// show and why, and what to record for them. An error where nothing can be learnt from them.
+pub fn check(request: &Request) -> Result<Vec<String>, InputError> {
+    let (rig, fit, holdout) = read_all(request)?;
+    check_recordings(&rig, &fit, &holdout)
+}
+
+/// The same of recordings that are already read.
+pub fn check_recordings(
+    rig: &Rig,
+    fit: &[Recording],
+    holdout: &[Recording],
+) -> Result<Vec<String>, InputError> {
+    let checked = data_faults::check(rig, fit, holdout);
+    Ok(report::check::sentences(&pipeline::check(rig, &checked, &|_, _| {})?))
 }
 
 /// Diagnoses recordings that are already read; an error where one cannot be used, as where a unit

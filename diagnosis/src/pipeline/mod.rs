@@ -8,6 +8,7 @@
 
 mod assess;
 mod by_regression;
+pub(crate) mod check;
 mod contenders;
 mod decide;
 pub(crate) mod diagnosis;
@@ -30,6 +31,7 @@ use crate::thresholds::CLEARLY_LESS;
 use crate::validation::residuals::above;
 use assess::Assessment;
 use by_regression::by_regression;
+use check::Check;
 use diagnosis::{Diagnosis, Reason};
 use prepare::Prepared;
 use regression::Hypothesis;
@@ -38,17 +40,42 @@ use search::Found;
 /// A callback that receives the stage and the fraction done.
 pub(crate) type Progress<'a> = &'a (dyn Fn(&str, f64) + Sync);
 
+/// Why nothing can be learnt from recordings: a sentence of a recording that cannot be used at all,
+/// or of too little motion.
+enum Unusable {
+    Refused(String),
+    TooLittle(String),
+}
+
+fn unusable_or_too_little(rig: &Rig, checked: &Checked) -> Option<Unusable> {
+    let all: Vec<&Recording> = checked.fit.iter().chain(&*checked.holdout).collect();
+    let too_little = || {
+        let sentence = checked.too_slow.clone();
+        sentence.or_else(|| sufficiency::too_little(&checked.fit, &checked.holdout))
+    };
+    unusable(&all, rig).map(Unusable::Refused).or_else(|| too_little().map(Unusable::TooLittle))
+}
+
+/// Says what recordings can and cannot show; an error where nothing can be learnt from them.
+pub(crate) fn check(rig: &Rig, checked: &Checked, progress: Progress) -> Result<Check, InputError> {
+    match unusable_or_too_little(rig, checked) {
+        Some(Unusable::Refused(sentence) | Unusable::TooLittle(sentence)) => Err(InputError::new(sentence)),
+        None => Ok(check::check(rig, checked, progress)),
+    }
+}
+
 /// Diagnoses recordings of a rig; an error where one of them cannot be used at all.
 pub(crate) fn run(rig: &Rig, checked: &Checked, progress: Progress) -> Result<Diagnosis, InputError> {
+    match unusable_or_too_little(rig, checked) {
+        Some(Unusable::Refused(sentence)) => return Err(InputError::new(sentence)),
+        Some(Unusable::TooLittle(sentence)) => {
+            let reason = Reason::Recordings(sentence);
+            return Ok(Diagnosis::CannotTell { rig: Box::new(rig.clone()), reason, rate_hz: None });
+        }
+        None => {}
+    }
     let (fit, holdout) = (&*checked.fit, &*checked.holdout);
     let all: Vec<&Recording> = fit.iter().chain(holdout).collect();
-    if let Some(sentence) = unusable(&all, rig) {
-        return Err(InputError::new(sentence));
-    }
-    if let Some(sentence) = checked.too_slow.clone().or_else(|| sufficiency::too_little(fit, holdout)) {
-        let reason = Reason::Recordings(sentence);
-        return Ok(Diagnosis::CannotTell { rig: Box::new(rig.clone()), reason, rate_hz: None });
-    }
     let mut prepared = prepare::prepare(rig, checked, None, progress);
     let mut found = search::search(&prepared, progress);
     if let Some(rows) = hidden_skew(&prepared, &found) {

@@ -1,5 +1,6 @@
 //! Sentences, pages and files of a finished diagnosis. Nothing here fits.
 
+pub(crate) mod check;
 pub mod exports;
 mod faults;
 mod form_in_words;

@@ -292,7 +292,11 @@ mod tests {
             let all = N::ALL.iter();
             all.filter(|name| !shapes(**name, &span, &nominal).is_empty()).count()
         };
-        assert_eq!(sought(true), sought(false) + 5, "deadband, clip, delay, lag and a gain that drifts");
+        assert_eq!(
+            sought(true),
+            sought(false) + 6,
+            "deadband, clip, delay, lag, loss and a gain that drifts"
+        );
     }
 
     #[test]

@@ -60,8 +60,9 @@ pub(crate) fn page_for_others(url: &str) {
     }
 }
 
-/// Asks the system for its browser. If the system has no browser, the printed address remains.
-fn open(url: &str) {
+/// Asks the system for its browser, to show an address or a file. If the system has no browser, the
+/// printed address remains.
+pub fn open(url: &str) {
     let mut command = if cfg!(target_os = "windows") {
         let mut command = Command::new("rundll32");
         command.arg("url.dll,FileProtocolHandler");

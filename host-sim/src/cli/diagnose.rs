@@ -23,23 +23,23 @@ use std::time::Duration;
 pub(crate) struct Diagnose {
     /// The simulation as its author believes it
     #[arg(long, value_name = "RIG.toml")]
-    rig: PathBuf,
+    pub(super) rig: PathBuf,
     /// A recording to fit and to choose with; may be repeated
     #[arg(long, required = true, value_name = "FILE.csv")]
-    fit: Vec<PathBuf>,
+    pub(super) fit: Vec<PathBuf>,
     /// A recording only to judge with; may be repeated
     #[arg(long, required = true, value_name = "FILE.csv")]
-    holdout: Vec<PathBuf>,
+    pub(super) holdout: Vec<PathBuf>,
     /// Your own formulas to search too
     #[arg(long, value_name = "F.toml")]
-    effects: Option<PathBuf>,
+    pub(super) effects: Option<PathBuf>,
     /// Folder for the report
     #[arg(long, value_name = "DIR")]
-    out: PathBuf,
+    pub(super) out: PathBuf,
     /// Also write the patched rig for another simulator: mjcf (MuJoCo), urdf or json; may be
     /// repeated
     #[arg(long, value_name = "mjcf|urdf|json")]
-    export: Vec<String>,
+    pub(super) export: Vec<String>,
 }
 
 impl Diagnose {

@@ -1,10 +1,12 @@
 //! One module a command; those that need no diagnosis are in `live`.
 
 mod characterise;
+mod check;
 mod commission;
 mod compensate;
 mod completions;
 mod confirm;
+mod demo;
 mod diagnose;
 mod experiment;
 mod export;
@@ -43,6 +45,8 @@ enum Command {
     Commission(commission::Commission),
     Compensate(compensate::Compensate),
     Characterise(characterise::Characterise),
+    Demo(demo::Demo),
+    Check(check::Check),
     Diagnose(diagnose::Diagnose),
     Experiment(experiment::Experiment),
     Settle(settle::Settle),
@@ -64,6 +68,8 @@ impl Cli {
             Some(Command::Commission(command)) => command.run(),
             Some(Command::Compensate(command)) => command.run(),
             Some(Command::Characterise(command)) => command.run(),
+            Some(Command::Demo(command)) => command.run(),
+            Some(Command::Check(command)) => command.run(),
             Some(Command::Diagnose(command)) => command.run(),
             Some(Command::Experiment(command)) => command.run(),
             Some(Command::Settle(command)) => command.run(),

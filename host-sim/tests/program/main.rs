@@ -11,6 +11,7 @@ mod command_line;
 mod commission;
 mod common;
 mod compensate;
+mod demo;
 mod fit_force;
 mod force_depth;
 mod glossary;

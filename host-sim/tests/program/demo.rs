@@ -1,0 +1,73 @@
+//! The demonstrations that come with the program: what they end in, against the truth in
+//! `tests/independent/demo.py`, which made their recordings.
+
+use crate::common::{folder, run_well, text};
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// The repository's folder.
+fn top() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}
+
+fn report(which: &str) -> (String, Value) {
+    let out = folder(&format!("demo-{which}"));
+    let said = run_well(&["demo", which, "--no-open", "--out", text(&out)]);
+    assert!(out.join(which).join("report.html").is_file());
+    let json = std::fs::read_to_string(out.join(which).join("diagnosis.json")).expect("it was written");
+    (said, serde_json::from_str(&json).expect("it is JSON"))
+}
+
+#[test]
+fn a_demonstration_finds_the_cogging_that_its_rotor_has() {
+    let (said, report) = report("missing");
+    let effects = report["effects"].as_array().expect("effects");
+    assert_eq!(effects.len(), 1, "{said}");
+    assert_eq!(effects[0]["name"], "cogging");
+    let amplitude = &effects[0]["parameters"]["order_14"];
+    let ends = [0, 1].map(|i| amplitude["ci95"][i].as_f64().expect("an interval"));
+    assert!(ends[0] < 0.08 && 0.08 < ends[1], "{amplitude}");
+    let error = |model: &str| report["fit"][model]["holdout"].as_f64().expect("a force error");
+    assert!(error("patched") < 0.25 * error("refit"), "{said}");
+}
+
+#[test]
+fn a_demonstration_at_one_speed_cannot_tell_and_says_what_to_record() {
+    let (said, report) = report("cannot-tell");
+    assert_eq!(report["verdict"], "insufficient_excitation", "{said}");
+    assert!(report["effects"].as_array().expect("effects").is_empty());
+    assert!(!report["record_next"].as_str().expect("advice").is_empty(), "{said}");
+}
+
+#[test]
+fn the_recordings_are_those_of_the_plant_to_the_byte() {
+    let made = folder("demo-made");
+    let script = top().join("tests/independent/demo.py");
+    let status = Command::new("python3").arg(script).arg(&made).status().expect("there is python3");
+    assert!(status.success());
+    for which in ["missing", "cannot-tell"] {
+        for file in ["rig.toml", "fit-a.csv", "fit-b.csv", "holdout.csv"] {
+            let [kept, made] =
+                [top().join("host-sim/demo"), made.clone()].map(|dir| dir.join(which).join(file));
+            let read = |path: &Path| std::fs::read(path).expect("it can be read");
+            assert!(read(&kept) == read(&made), "{which}/{file} is not what tests/independent/demo.py makes");
+        }
+    }
+}
+
+#[test]
+fn a_check_says_in_seconds_what_the_recordings_cannot_show() {
+    let check = |which: &str| {
+        let file = |name: &str| top().join("host-sim/demo").join(which).join(name).display().to_string();
+        let [rig, a, b, held] = ["rig.toml", "fit-a.csv", "fit-b.csv", "holdout.csv"].map(file);
+        run_well(&["check", "--rig", &rig, "--fit", &a, "--fit", &b, "--holdout", &held])
+    };
+    let lively = check("missing");
+    // 8 s of 250 rows a second; less than a turn of travel.
+    assert!(lively.contains("fit-a.csv: 8 s at 250 rows a second"), "{lively}");
+    assert!(!lively.contains("about one speed"), "{lively}");
+    let steady = check("cannot-tell");
+    assert!(steady.contains("viscous friction and dry friction cannot be told apart"), "{steady}");
+    assert!(steady.contains("about one speed") && steady.contains("record next: a staircase"), "{steady}");
+}
