@@ -9,7 +9,7 @@ use recording::read::Recording;
 use recording::stretches::{Stretch, stretches};
 use std::ops::Range;
 use training::score::target::Reached;
-use training::score::{Judge, spans};
+use training::score::{Insertion, Judge};
 
 /// A procedure as it was recorded, in one piece.
 pub(super) struct Trace {
@@ -77,8 +77,7 @@ impl Trace {
     /// Largest force across the needle that would have held its direction, N; none without a
     /// fixture.
     pub(super) fn largest_lateral_n(&self, profile: &Profile) -> Option<f64> {
-        let judge = Judge::new(profile, &[], self.stretch.first_tick);
-        spans(&self.stretch).into_iter().find_map(|span| judge.insertion(span).largest_lateral_n)
+        self.insertions(profile).into_iter().find_map(|one| one.largest_lateral_n)
     }
 
     /// Index at which the needle has come to rest after `from`: not a count for a tenth of a
@@ -95,8 +94,12 @@ impl Trace {
 
     /// Returns the result for the patient's target in the first insertion.
     pub(super) fn target(&self, profile: &Profile) -> Option<Reached> {
-        let judge = Judge::new(profile, &[], self.stretch.first_tick);
-        spans(&self.stretch).into_iter().find_map(|span| judge.insertion(span).target)
+        self.insertions(profile).into_iter().find_map(|one| one.target)
+    }
+
+    fn insertions(&self, profile: &Profile) -> Vec<Insertion> {
+        let judge = Judge::new(profile, None, self.stretch.first_tick);
+        judge.spans(&self.stretch).into_iter().map(|(span, _)| judge.insertion(span)).collect()
     }
 
     /// Way of the tip in mm, and the force across the needle that would hold its direction of

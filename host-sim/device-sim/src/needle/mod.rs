@@ -133,9 +133,11 @@ impl NeedleTrack {
 
     /// True if the tip is in layer `number`: past its wall, if it has one.
     pub fn is_in(&self, number: usize) -> bool {
+        if self.walls.get(number).is_some_and(|has_wall| *has_wall) {
+            return self.holds(number);
+        }
         let met = self.tops_mm.get(number).copied().flatten();
         met.is_some_and(|top_mm| self.depth_mm >= top_mm)
-            && (!self.walls.get(number).is_some_and(|has_wall| *has_wall) || self.holds(number))
     }
 
     /// Returns the deepest layer that the tip is in; none outside, or where it presses on the skin.

@@ -5,7 +5,7 @@ use crate::profile::Profile;
 use control_core::units::Millimetres;
 use control_core::{NeedleLine, Plan};
 use fixed::types::I16F16;
-use link::frames::DeviceFrame;
+use link::frames::{DeviceFrame, EventKind};
 use std::time::Duration;
 
 /// Time between two lines: 66 a second. The device takes up to 12 ms for one.
@@ -22,6 +22,8 @@ const OUT_OF_REACH_MM: f64 = 55.0;
 pub struct LineSender {
     track: NeedleTrack,
     plan: Plan,
+    /// The layers of the patient, which a device has until it is sent a line.
+    own: NeedleLine,
     sent: NeedleLine,
     sent_at: Duration,
 }
@@ -32,6 +34,7 @@ impl LineSender {
         Self {
             track: NeedleTrack::new(profile),
             sent: own(profile),
+            own: own(profile),
             plan: profile.plan.clone(),
             sent_at: Duration::ZERO,
         }
@@ -43,7 +46,14 @@ impl LineSender {
             DeviceFrame::Pose(pose) => {
                 self.track.move_to(pose.depth.0.to_num(), f64::from(pose.angle.0) * 1e-3);
             }
-            DeviceFrame::Event(event) => self.track.happen(&event.kind),
+            DeviceFrame::Event(event) => {
+                if event.kind == EventKind::Started {
+                    // A zero before it has made the device forget the last line.
+                    self.sent = self.own.clone();
+                }
+                self.track.happen(&event.kind);
+            }
+            DeviceFrame::Hello(_) => self.sent = self.own.clone(),
             _ => {}
         }
     }

@@ -27,7 +27,10 @@ fn a_needle_in_the_vein_is_lowered_about_its_wall() {
     assert!(needle.is_in_lumen());
     // What it has passed goes along, the far wall is where it was: 3 mm below the near one.
     let tops: Vec<f64> = needle.tops_mm().iter().map(|top| top.expect("met")).collect();
-    assert!((tops[2] - wall_mm).abs() < 1e-3 && (tops[3] - wall_mm - 3.0 / flat.sin()).abs() < 1e-3, "{tops:?}");
+    assert!(
+        (tops[2] - wall_mm).abs() < 1e-3 && (tops[3] - wall_mm - 3.0 / flat.sin()).abs() < 1e-3,
+        "{tops:?}"
+    );
     // Drawn back out of the vein it turns about the skin again.
     needle.move_to(wall_mm - 1.0, flat);
     assert!(!needle.is_in_lumen() && needle.origin_mm() == [0.0; 2]);
