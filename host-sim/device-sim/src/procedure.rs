@@ -80,7 +80,7 @@ struct File {
     start_mm: f64,
     purpose: Option<Purpose>,
     entry_deg: Option<f64>,
-    /// Where it enters a patient with a body; without it, where the patient's file says.
+    /// The place at which it enters a body; without it, the one in the patient's file.
     along_mm: Option<f64>,
     around_deg: Option<f64>,
     azimuth_deg: Option<f64>,
@@ -384,7 +384,10 @@ mod tests {
             (good.replace("seconds = 2.0", "speed_mm_s = -3.0"), "speed_mm_s"),
             (good.replace("seconds = 1.5", "seconds = 1.5\nturned_deg = 5.0"), "turned_deg = 0"),
             (good.replace("seconds = 2.0", "seconds = 2.0\nturned_deg = 500.0"), "turned_deg"),
-            (good.replace("task = \"tourniquet_on\"", "task = \"dance\""), "use one of tourniquet_on, tourniquet_off"),
+            (
+                good.replace("task = \"tourniquet_on\"", "task = \"dance\""),
+                "use one of tourniquet_on, tourniquet_off",
+            ),
             (good.replace("purpose = \"blood-draw\"\n", ""), "has no purpose"),
             (good.replace("purpose = \"blood-draw\"", "purpose = \"dance\""), "dance"),
         ] {

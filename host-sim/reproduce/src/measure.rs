@@ -63,15 +63,23 @@ impl Trace {
         (from..self.len()).find(|index| self.depth_at(*index) < begin - 1.0).unwrap_or(from)
     }
 
+    /// Index after `from` at which the tip comes within 0.5 mm of the deepest place that it reaches
+    /// before it is drawn back by a mm.
+    pub(super) fn nearly_turning(&self, from: usize) -> usize {
+        let mut deepest = self.depth_at(from);
+        for index in from..self.len() {
+            let depth = self.depth_at(index);
+            if depth < deepest - 1.0 {
+                break;
+            }
+            deepest = deepest.max(depth);
+        }
+        (from..self.len()).find(|index| self.depth_at(*index) >= deepest - 0.5).unwrap_or(from)
+    }
+
     /// Index at `seconds`.
     pub(super) fn index(&self, seconds: f64) -> usize {
         ((seconds * f64::from(TICK_HZ)) as usize).min(self.len().saturating_sub(1))
-    }
-
-    /// Index at which the tip comes within 0.5 mm of the deepest place: before it rests there.
-    pub(super) fn nearly_deepest(&self) -> usize {
-        let depth = self.depth_at(self.deepest()) - 0.5;
-        (0..self.len()).find(|index| self.depth_at(*index) >= depth).unwrap_or(0)
     }
 
     /// Largest force across the needle that would have held its direction, N; none without a

@@ -36,7 +36,7 @@ pub struct Replay<'a> {
     /// all of it.
     times: Vec<u64>,
     length: u64,
-    /// Where the needle is in the patient of the recording, if that is known.
+    /// The needle in the patient of the recording, if that is known.
     track: Option<NeedleTrack>,
 }
 

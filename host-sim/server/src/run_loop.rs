@@ -48,7 +48,7 @@ pub struct RunLoop<'a> {
     patients: Option<PatientManager>,
     /// The practice that judges insertions while somebody looks.
     practice: Option<Practice>,
-    /// Where the needle is in its patient, if that is known.
+    /// The needle in its patient, if that is known.
     needle: Option<LineSender>,
 }
 

@@ -85,7 +85,7 @@ fn judged(patient: &str, script: &str, wanted: Option<&str>) {
 }
 
 #[test]
-fn a_right_cannulation_passes_and_each_wrong_one_fails_for_its_reason() {
+fn each_wrong_cannulation_fails_for_its_own_reason() {
     for (script, wanted) in SCRIPTS {
         judged("forearm", script, wanted);
     }

@@ -38,7 +38,7 @@ fn a_venepuncture_is_scored_and_debriefed() {
     let said = run_well(&["debrief", text(&file), text(&file), "--out", text(&out)]);
     assert!((figure(&said, "insertions") - 4.0).abs() < 1e-9, "{said}");
     let page = std::fs::read_to_string(out.join("debrief.html")).expect("written");
-    for words in ["held for", "through the far wall", "4.8 mm", "<svg", "change"] {
+    for words in ["in the vein for", "through the far wall", "4.8 mm", "<svg", "change"] {
         assert!(page.contains(words), "{words}");
     }
     assert!(!page.contains("http") && !page.contains("NaN"));

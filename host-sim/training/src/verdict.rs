@@ -1,5 +1,5 @@
-//! The verdict on an attempt: each step of its [`Goal`] with what came of it, and the reasons why it
-//! did not pass. A step that could not be done because an earlier one was not is no reason of its
+//! The verdict on an attempt: each step of its [`Goal`] with its state, and the reasons why it did
+//! not pass. A step that could not be done because an earlier one was not is no reason of its
 //! own.
 
 use crate::goal::{ADVANCED_MM, DRAWN_S, ENTRY_DEG, Goal, LOWERED_DEG, Step};
@@ -29,7 +29,7 @@ pub struct StepResult {
     pub words: String,
     /// The name of the task that a person reports for it; none where the needle tells.
     pub task: Option<String>,
-    /// What came of it.
+    /// Its state.
     pub state: StepState,
 }
 
@@ -64,11 +64,11 @@ pub(crate) struct Done {
     pub(crate) tick: u64,
 }
 
-/// What is known of an attempt.
+/// The facts of an attempt.
 pub(crate) struct Facts<'a> {
     pub(crate) course: &'a Course,
     pub(crate) done: &'a [Done],
-    /// What became of the target, and the visits of it.
+    /// The outcome for the target, and the visits of it.
     pub(crate) target: Option<(TargetOutcome, &'a [(u64, u64)])>,
 }
 
@@ -190,7 +190,7 @@ impl Facts<'_> {
         wrong("angle", false, format!("the skin was pierced at {degrees}°, not at {low}–{high}°"))
     }
 
-    /// What was entered or touched that was to be spared.
+    /// Returns a reason for each structure to be spared that was entered or touched.
     fn spared(&self) -> Vec<Found> {
         let mut names: Vec<&str> = Vec::new();
         for hit in &self.course.hits {

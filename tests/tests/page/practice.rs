@@ -33,9 +33,17 @@ fn visit() -> Result<(), Error> {
     let program = Program::start_in(&places.program, &scratch, &["run", "--port", "0"])?;
     let mut page = open(&browser, &program.url, SIZES[0])?;
     page.click("view-practice")?;
-    page.wait("the goal", SOON, "document.getElementById('goal').textContent.includes('Draw blood from the vein')")?;
+    page.wait(
+        "the goal",
+        SOON,
+        "document.getElementById('goal').textContent.includes('Draw blood from the vein')",
+    )?;
     let steps = page.text("document.getElementById('steps').innerText")?;
-    check("the goal is a list of steps", steps.contains("Tourniquet on") && steps.contains("Needle out"), steps)?;
+    check(
+        "the goal is a list of steps",
+        steps.contains("Tourniquet on") && steps.contains("Needle out"),
+        steps,
+    )?;
     page.wait(
         "the scripted hand's attempt",
         A_FEW_INSERTIONS,

@@ -1,4 +1,4 @@
-//! Where a line meets the layers that the device has: level ones, or those of a body.
+//! The places at which a line meets the layers that the device has: level ones, or those of a body.
 
 use crate::profile::{InBody, Profile};
 

@@ -36,7 +36,7 @@ pub struct NeedleTrack {
     origin_mm: [f64; 2],
     angle_rad: f64,
     depth_mm: f64,
-    /// Where its line meets each layer of the device, mm along the needle; none where it does not.
+    /// The depth at which its line meets each layer of the device, mm; none where it does not.
     tops_mm: Vec<Option<f64>>,
 }
 

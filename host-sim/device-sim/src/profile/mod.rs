@@ -201,8 +201,8 @@ impl Profile {
         goal::goal(self.goal, &self.config.patient, self.entry_rad, self.body.is_some())
     }
 
-    /// Returns the tissue that the needle is to come into: that of the file, else a vein that is not
-    /// to be spared. It does not depend on the needle's line.
+    /// Returns the tissue that the needle is to come into: that of the file, else a vein that is
+    /// not to be spared. It does not depend on the needle's line.
     pub fn aim(&self) -> Option<Tissue> {
         self.goal.map(goal::Written::tissue).or(self.has_vein.then_some(Tissue::Vessel))
     }

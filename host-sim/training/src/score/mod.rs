@@ -1,11 +1,12 @@
 //! A trainee's figures, insertion by insertion: time, path, force, punctures, the vessel, angle,
-//! smoothness. [`gesture`] is the movement, [`course`] what it entered, [`smoothness`] a measure of any
-//! movement; here they are put together, with the verdict.
+//! smoothness. [`gesture`] is the movement, [`course`] what it entered, [`smoothness`] a measure of
+//! any movement; here they are put together, with the verdict.
 
 pub(crate) mod course;
 pub mod gesture;
 mod probe;
 pub mod smoothness;
+mod span;
 pub mod target;
 pub mod track;
 
@@ -14,16 +15,16 @@ use crate::verdict::{self, Done, Facts, Verdict};
 use control_core::TICK_HZ;
 use control_core::config::{Fixture, Law, Tissue};
 use control_core::controller::Sample;
-use course::Course;
+use course::{Course, Surroundings};
 use device_sim::error::Error;
-use device_sim::needle::NeedleTrack;
 use device_sim::procedure::purpose::Purpose;
-use device_sim::profile::{Beside, Goal, Profile};
+use device_sim::profile::{Goal, Profile};
 use gesture::Gesture;
 use link::frames::{Event, EventKind};
 use recording::read::Recording;
 use recording::stretches::{Stretch, stretches};
 use serde::{Deserialize, Serialize};
+pub use span::Span;
 use std::rc::Rc;
 use target::Reached;
 
@@ -116,17 +117,6 @@ fn enters_vessel(stretch: &Stretch, (begin, end): (u64, u64)) -> bool {
     within.any(|event| matches!(event.kind, EventKind::Vessel { .. } | EventKind::Flashback { .. }))
 }
 
-/// Ticks of an insertion and where they are.
-#[derive(Clone, Copy, Debug)]
-pub struct Span<'a> {
-    /// The whole that it is a part of.
-    pub stretch: &'a Stretch,
-    /// First tick.
-    pub begin: u64,
-    /// Tick after the last.
-    pub end: u64,
-}
-
 /// All insertions of a recording, judged by one profile or each by the one that it was recorded
 /// with.
 pub fn score(recording: &Recording, by: Option<&Profile>) -> Result<Score, Error> {
@@ -173,45 +163,14 @@ fn visits(stretch: &Stretch) -> Vec<(u64, Option<u64>)> {
     visits
 }
 
-impl Span<'_> {
-    /// Its samples, 10 kHz.
-    pub fn samples(&self) -> &[Sample] {
-        &self.stretch.samples[self.at(self.begin)..self.at(self.end)]
-    }
-
-    fn at(&self, tick: u64) -> usize {
-        (tick.clamp(self.stretch.first_tick, self.stretch.end_tick()) - self.stretch.first_tick) as usize
-    }
-
-    /// Events in it.
-    pub fn events(&self) -> impl Iterator<Item = &Event> + '_ {
-        self.stretch.events.iter().filter(|e| (self.begin..=self.end).contains(&e.tick))
-    }
-
-    /// Depth along the needle at `tick`, mm.
-    pub fn depth_mm(&self, tick: u64) -> Option<f64> {
-        let sample = self.stretch.samples.get(self.at(tick))?;
-        Some(f64::from(sample.count) * self.stretch.hello.mm_per_count)
-    }
-}
-
 /// The figures by which insertions are judged.
 #[derive(Clone, Debug)]
 pub struct Judge {
     entry_rad: f64,
-    skin_tilt_rad: f64,
-    /// What the attempt is for.
     aim: Aim,
-    /// A needle outside the patient.
-    track: NeedleTrack,
+    surroundings: Surroundings,
     vessel: Option<u8>,
-    target_layer: Option<usize>,
-    /// For each layer, outermost first, whether it has a wall.
-    walls: Vec<bool>,
     goal: Option<Goal>,
-    /// Number and name of each layer to be spared.
-    spared: Vec<(u8, String)>,
-    beside: Vec<Beside>,
     fixture: Option<Fixture>,
     zero_tick: u64,
 }
@@ -230,18 +189,12 @@ impl Judge {
     /// By `profile` and the purpose of the procedure; times count from `zero_tick`.
     pub fn new(profile: &Profile, purpose: Option<Purpose>, zero_tick: u64) -> Self {
         let layers = &profile.config.patient.layers;
-        let goal = profile.goal();
         Self {
             entry_rad: profile.entry_rad,
-            skin_tilt_rad: profile.skin_tilt_rad(),
             aim: Aim::of(profile, purpose),
-            track: NeedleTrack::new(profile),
+            surroundings: Surroundings::new(profile),
             vessel: layers.iter().position(|l| l.tissue == Tissue::Vessel).map(|at| at as u8),
-            target_layer: goal.as_ref().map(|goal| usize::from(goal.layer)),
-            walls: profile.walls(),
-            goal,
-            spared: profile.spared.iter().filter_map(|n| Some((*n, profile.layer_name(*n)?))).collect(),
-            beside: profile.beside.clone(),
+            goal: profile.goal(),
             fixture: match &profile.config.patient.law {
                 Law::Sparte(law) => Some(law.fixture),
                 Law::Jog(_) | Law::Xr(_) => None,
@@ -258,8 +211,8 @@ impl Judge {
         Some(f64::from(most) * fixture.per_mrad.0.to_num::<f64>())
     }
 
-    /// The attempts of a stretch, and whether each has ended. Where the goal begins with a task, the
-    /// needle may leave the skin and pierce it again in one attempt: until it has come into the
+    /// The attempts of a stretch, and whether each has ended. Where the goal begins with a task,
+    /// the needle may leave the skin and pierce it again in one attempt: until it has come into the
     /// vein, the task is done anew, or [`AGAIN_TICKS`] have passed.
     pub fn spans<'a>(&self, stretch: &'a Stretch) -> Vec<(Span<'a>, bool)> {
         let mut attempts: Vec<(u64, u64, bool)> = Vec::new();
@@ -297,7 +250,10 @@ impl Judge {
     fn target(&self, span: Span<'_>, course: &Course) -> Option<(Reached, Vec<(u64, u64)>)> {
         let (events, ticks) = (&span.stretch.events, (span.begin, span.end));
         let goal = self.goal.as_ref()?;
-        Some(target::walk(events, ticks, goal, |tick| course.meets_target(tick), 1.0 / f64::from(TICK_HZ)))
+        let is_there = |tick| course.meets_target(tick);
+        let (mut reached, visits) = target::walk(events, ticks, goal, is_there, 1.0 / f64::from(TICK_HZ));
+        reached.passed_beside = reached.passed_beside.max(course.passed_beside);
+        Some((reached, visits))
     }
 
     /// Returns the tasks that were done for an attempt: since the needle left the skin the last
@@ -316,7 +272,7 @@ impl Judge {
 
     /// The verdict on an attempt, which may be going on.
     pub fn verdict(&self, span: Span<'_>) -> Verdict {
-        let course = Course::new(span, self);
+        let course = Course::new(span, &self.surroundings);
         self.judged(span, &course, self.target(span, &course).as_ref())
     }
 
@@ -332,12 +288,31 @@ impl Judge {
 
     /// The movement of an attempt.
     pub fn gesture(&self, span: Span<'_>) -> Gesture {
-        Gesture::new(1_000.0, Course::new(span, self).places)
+        Gesture::new(1_000.0, Course::new(span, &self.surroundings).places)
+    }
+
+    /// Returns when the vessel was first touched.
+    fn contact(&self, span: Span<'_>) -> Option<u64> {
+        let layer = self.vessel?;
+        let mut events = span.events();
+        events.find(|event| event.kind == EventKind::Contact { layer }).map(|event| event.tick)
+    }
+
+    /// Returns how often something to be spared was touched, and the names of what was and was not.
+    fn hits(&self, span: Span<'_>, gesture: &Gesture) -> (u32, Vec<String>, Vec<String>) {
+        let Surroundings { spared: layers, beside, .. } = &self.surroundings;
+        let touched =
+            |e: &&Event| layers.iter().any(|(layer, _)| e.kind == EventKind::Contact { layer: *layer });
+        let touches = span.events().filter(touched).count() as u32;
+        let ticks = (span.begin, span.end);
+        let (mut hit, mut spared) = target::hit_and_spared(&span.stretch.events, ticks, layers);
+        let beside_hits = target::beside_hits(&gesture.places, beside, &mut hit, &mut spared);
+        (touches + beside_hits, hit, spared)
     }
 
     /// The figures of one insertion.
     pub fn insertion(&self, span: Span<'_>) -> Insertion {
-        let course = Course::new(span, self);
+        let course = Course::new(span, &self.surroundings);
         let (begin, end) = (span.begin, span.end);
         let samples = span.samples();
         let hello = &span.stretch.hello;
@@ -345,21 +320,16 @@ impl Judge {
         let deepest = samples.iter().map(|s| s.count).max().unwrap_or(0);
         let depth_mm = f64::from(deepest) * hello.mm_per_count;
         let given = || span.events().filter(|e| matches!(e.kind, EventKind::Puncture { .. }));
-        let met_vessel = |e: &&Event| self.vessel.is_some_and(|layer| e.kind == EventKind::Contact { layer });
-        let contact = span.events().find(met_vessel).map(|event| event.tick);
+        let contact = self.contact(span);
         let entry = course.lumen.first().map(|(from, _)| *from);
         let target = self.target(span, &course);
         let verdict = self.judged(span, &course, target.as_ref());
-        let touched =
-            |e: &&Event| self.spared.iter().any(|(layer, _)| e.kind == EventKind::Contact { layer: *layer });
-        let touches = span.events().filter(touched).count() as u32;
-        let (mut hit, mut spared) = target::hit_and_spared(&span.stretch.events, (begin, end), &self.spared);
-        let beside_hits = target::beside_hits(&gesture.places, &self.beside, &mut hit, &mut spared);
+        let (spared_hits, hit, spared) = self.hits(span, &gesture);
         let seen = probe::seen(&span.stretch.probes, (begin, end));
         let again = track::met_again(&span.stretch.events, (begin, end));
         let inside = given().next().map_or(&[][..], |e| &span.stretch.samples[span.at(e.tick)..span.at(end)]);
         let first = inside.first();
-        let angle_rad = first.map(|s| f64::from(s.tilt_mrad) * 1e-3 - self.skin_tilt_rad);
+        let angle_rad = first.map(|s| f64::from(s.tilt_mrad) * 1e-3 - self.surroundings.skin_tilt_rad);
         let wanted_rad = self.entry_rad;
         let along = gesture.angle_error(wanted_rad);
         let passes = gesture.passes();
@@ -380,7 +350,7 @@ impl Judge {
             met_in_track: again.in_track,
             pierced_again: again.whole,
             through_far_wall: course.far_wall.is_some(),
-            spared_hits: touches + beside_hits,
+            spared_hits,
             target: target.map(|(reached, _)| reached),
             verdict,
             hit,

@@ -1,9 +1,7 @@
 //! The structures that an insertion was to reach and to spare, by name, from the device's events
 //! and the tip's place along the skin.
 //!
-//! A target is a layer, or a part of it that ends to either side: layers of the device go on for
-//! ever, so that a bursa is missed here only where its patient says how far it reaches. What the
-//! hand feels there is the layer all the same.
+//! A target is a layer, or a part of it that ends to either side.
 
 use super::gesture::Place;
 use device_sim::profile::{Beside, Goal};
