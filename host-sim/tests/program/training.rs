@@ -369,7 +369,7 @@ fn tasks_are_recorded_and_scored() {
     for (name, text_of, wanted, critical) in cases {
         let file = folder(&format!("tasks-{name}-file")).join("p.toml");
         std::fs::write(&file, text_of).expect("the folder can be written");
-        let arguments = ["--seconds", "9.7", "--profile", "shoulder-joint", "--procedure", text(&file)];
+        let arguments = ["--seconds", "9.2", "--profile", "shoulder-joint", "--procedure", text(&file)];
         let (recorded, insertions) = scored(&format!("tasks-{name}"), &arguments);
         let [one] = &insertions[..] else { panic!("{name}: {} insertions", insertions.len()) };
         let verdict = &one["verdict"];
