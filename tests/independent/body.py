@@ -99,6 +99,7 @@ def forearm(fat):
         ("fat", cylinder(34 + fat, 26 + fat)),
         ("muscle", cylinder(34, 26)),
         ("artery", tube(across - 16, down - 16, lambda x: -8 + 0.05 * x, (-90, 110), 2.0)),
+        ("nerve", tube(across - 5.5, down - 5.5, lambda x: 14 + 0 * x, (-90, 110), 1.0)),
         (
             "vein",
             either(

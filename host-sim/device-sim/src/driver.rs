@@ -8,7 +8,7 @@
 use control_core::compensation::Gains;
 use control_core::event::Fault;
 use control_core::excitation::Excitation;
-use control_core::{Device, Patient};
+use control_core::{Device, NeedleLine, Patient};
 use link::codec::{self, MAX_FRAME};
 use link::frames::{Ack, Command, CommandRefusal, DeviceFrame, EventKind, GuardRefusal, PROTOCOL_VERSION};
 use link::host::{Commands, Counts, Reception};
@@ -200,6 +200,13 @@ impl Driver {
         self.waiting.push_back(Command::Compensate(gains));
     }
 
+    /// Tells the device where its needle, which has turned in tissue, meets the layers. Only the
+    /// latest line counts.
+    pub fn line(&mut self, line: NeedleLine) {
+        self.waiting.retain(|command| !matches!(command, Command::Line(_)));
+        self.waiting.push_back(Command::Line(line));
+    }
+
     /// Sets the counts past the zero at which the rotor's angle is zero.
     pub fn index(&mut self, count: i32) {
         self.waiting.push_back(Command::Index(Some(count)));
@@ -346,7 +353,8 @@ impl Driver {
             ) => {
                 self.notice = None;
             }
-            (Ok(()), _) => {}
+            // One for a patient that the device no longer has: the next will do.
+            (Ok(()), _) | (Err(CommandRefusal::Config(_)), Command::Line(_)) => {}
             // The same bytes again, soon.
             (Err(CommandRefusal::Full), _) => self.pending = Some(Pending { sent: now, ..pending }),
             (

@@ -10,6 +10,7 @@ pub mod driver;
 pub mod error;
 pub mod lockstep;
 pub mod named_files;
+pub mod needle;
 pub mod page;
 pub mod patients;
 pub mod plant;

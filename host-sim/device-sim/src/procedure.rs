@@ -3,18 +3,19 @@
 //! and Hogan 1985, doi:10.1523/JNEUROSCI.05-07-01688.1985), or go at an even speed, as a stage does
 //! that measures insertion forces.
 
-pub mod task;
+pub mod purpose;
 
 use crate::error::Error;
 use crate::named_files::{self, Text};
 use crate::plant::hand::Grip;
-use crate::profile::{Profile, TissueName, puncture_path_mm};
+use crate::profile::{Entry, Profile, TissueName, puncture_path_mm};
 use control_core::config::Tissue;
+use purpose::Purpose;
 use serde::Deserialize;
-use task::Task;
 
 /// The procedures that come with the program.
-pub const BUILT_IN: [(&str, &str); 7] = [
+pub const BUILT_IN: [(&str, &str); 8] = [
+    ("cannulation", include_str!("../../procedures/cannulation/right.toml")),
     ("venepuncture", include_str!("../../procedures/venepuncture.toml")),
     ("slow", include_str!("../../procedures/slow.toml")),
     ("injection", include_str!("../../procedures/injection.toml")),
@@ -42,8 +43,8 @@ pub struct Procedure {
     pub entry_rad: Option<f64>,
     /// One round, s.
     pub round_s: f64,
-    /// The tasks that it asks for, in their order.
-    pub tasks: Vec<Task>,
+    /// Its purpose; without one, the needle is to come into the patient's target.
+    pub purpose: Option<Purpose>,
     moves: Vec<Move>,
 }
 
@@ -67,8 +68,8 @@ struct Move {
     from_rad: f64,
     to_rad: f64,
     is_even: bool,
-    /// The task that the scripted hand does when the move begins, by its number.
-    task: Option<usize>,
+    /// The task that the scripted hand does when the move begins.
+    task: Option<&'static str>,
 }
 
 #[derive(Deserialize)]
@@ -77,11 +78,14 @@ struct File {
     format: u32,
     name: String,
     start_mm: f64,
+    purpose: Option<Purpose>,
     entry_deg: Option<f64>,
+    /// The place at which it enters a body; without it, the one in the patient's file.
+    along_mm: Option<f64>,
+    around_deg: Option<f64>,
+    azimuth_deg: Option<f64>,
     hand: HandFile,
     step: Vec<ProcedureStep>,
-    #[serde(default)]
-    task: Vec<Task>,
 }
 
 #[derive(Deserialize)]
@@ -114,10 +118,24 @@ struct ProcedureStep {
 impl Procedure {
     /// A built-in procedure by its name, or a file by its path.
     pub fn find(wanted: &str, profile: &Profile) -> Result<Self, Error> {
-        match insertion(wanted) {
-            Some(text) => Self::parse(&text, profile),
-            None => Self::parse(&named_files::find("procedure", wanted, &BUILT_IN)?, profile),
-        }
+        Self::parse(&text(wanted)?, profile)
+    }
+
+    /// A procedure, and the patient entered where and how it says, if that has a body.
+    pub fn entering(wanted: &str, profile: Profile) -> Result<(Self, Profile), Error> {
+        let text = text(wanted)?;
+        let file: File = named_files::parse(&text)?;
+        let entry = Entry {
+            along_mm: file.along_mm,
+            around_deg: file.around_deg,
+            azimuth_deg: file.azimuth_deg,
+            angle_deg: file.entry_deg,
+            turn_deg: None,
+        };
+        let is_elsewhere = file.along_mm.or(file.around_deg).or(file.azimuth_deg).is_some();
+        let turns = file.entry_deg.is_some() && profile.body.is_some();
+        let profile = if is_elsewhere || turns { profile.entered(&entry)? } else { profile };
+        Ok((Self::parse(&text, &profile)?, profile))
     }
 
     /// Checks the text of a procedure against the tissue of `profile`.
@@ -133,9 +151,8 @@ impl Procedure {
     }
 
     /// Returns the name of the task that the scripted hand does when a step begins.
-    pub(crate) fn task_of(&self, step: usize) -> Option<&str> {
-        let task = self.moves.get(step)?.task?;
-        Some(self.tasks.get(task)?.name.as_str())
+    pub(crate) fn task_of(&self, step: usize) -> Option<&'static str> {
+        self.moves.get(step)?.task
     }
 
     /// Returns the place where the hand wants the needle `seconds` into the procedure. Rounds
@@ -156,12 +173,22 @@ impl Procedure {
     }
 }
 
-/// Checks that a step can be done by the tasks listed; returns the number of its task.
-fn number_of(task: Option<&String>, step: &str, tasks: &[Task]) -> Result<Option<usize>, String> {
-    let Some(name) = task else { return Ok(None) };
-    let found = tasks.iter().position(|task| task.name == *name);
-    found.map(Some).ok_or_else(|| {
-        format!("step \"{step}\" does task \"{name}\", which is not listed; add a [[task]] with that name")
+/// The text of a built-in procedure by its name, or of a file by its path.
+fn text(wanted: &str) -> Result<Text, Error> {
+    insertion(wanted).map_or_else(|| named_files::find("procedure", wanted, &BUILT_IN), Ok)
+}
+
+/// Returns the task of a step, which must belong to the procedure's purpose.
+fn task_named(
+    task: Option<&str>,
+    step: &str,
+    purpose: Option<Purpose>,
+) -> Result<Option<&'static str>, String> {
+    let Some(wanted) = task else { return Ok(None) };
+    let known = purpose.map_or(&[][..], Purpose::tasks);
+    known.iter().find(|name| **name == wanted).copied().map(Some).ok_or_else(|| match known {
+        [] => format!("step \"{step}\" does task \"{wanted}\", and the procedure has no purpose; add one"),
+        _ => format!("step \"{step}\" does task \"{wanted}\"; use one of {}", known.join(", ")),
     })
 }
 
@@ -190,7 +217,6 @@ impl File {
         within("stiffness_n_per_mm", self.hand.stiffness_n_per_mm, 0.05, 10.0)?;
         within("damping_n_s_per_mm", self.hand.damping_n_s_per_mm, 0.0, 0.1)?;
         within("tremor_mm", self.hand.tremor_mm, 0.0, 2.0)?;
-        task::check(&self.task)?;
         let entry_rad = self.entry_deg.map_or(profile.entry_rad, f64::to_radians);
         let (mut moves, mut at, mut turned_deg, mut begin_s) = (Vec::new(), self.start_mm, 0.0, 0.0);
         for step in &self.step {
@@ -203,7 +229,7 @@ impl File {
             // Faster than a hand goes, and than the grip of the roller can follow.
             within(&format!("mm/s of step \"{}\"", step.name), (to_mm - at).abs() / seconds, 0.0, 500.0)?;
             let (from_rad, to_rad) = (f64::to_radians(turned_deg), to_deg.to_radians());
-            let task = number_of(step.task.as_ref(), &step.name, &self.task)?;
+            let task = task_named(step.task.as_deref(), &step.name, self.purpose)?;
             moves.push(Move { begin_s, seconds, from_mm: at, to_mm, from_rad, to_rad, is_even, task });
             begin_s += seconds;
             (at, turned_deg) = (to_mm, to_deg);
@@ -226,7 +252,7 @@ impl File {
             start_mm: self.start_mm,
             entry_rad: self.entry_deg.map(f64::to_radians),
             round_s: begin_s,
-            tasks: self.task.clone(),
+            purpose: self.purpose,
             moves,
         })
     }
@@ -345,7 +371,7 @@ mod tests {
 
     #[test]
     fn mistakes_are_refused_by_name() {
-        let good = BUILT_IN[0].1;
+        let good = BUILT_IN[1].1;
         for (wrong, hint) in [
             (good.replace("past = \"vessel\"", "past = \"bursa\""), "does not have"),
             (good.replace("seconds = 2.0", "seconds = 0.0"), "insert"),
@@ -358,12 +384,12 @@ mod tests {
             (good.replace("seconds = 2.0", "speed_mm_s = -3.0"), "speed_mm_s"),
             (good.replace("seconds = 1.5", "seconds = 1.5\nturned_deg = 5.0"), "turned_deg = 0"),
             (good.replace("seconds = 2.0", "seconds = 2.0\nturned_deg = 500.0"), "turned_deg"),
-            (good.replace("task = \"tourniquet_on\"", "task = \"dance\""), "[[task]]"),
-            (good.replace("name = \"tourniquet_off\"", "name = \"tourniquet_on\""), "listed twice"),
-            (good.replace("name = \"tourniquet_off\"", "name = \"Off!\""), "Off!"),
-            (good.replace("tip = \"outside\"", "tip = \"inside\""), "inside"),
-            (good.replacen("critical = [", "critical = [\"late\", ", 1), "late"),
-            (good.replacen("source = \"", "source = \"\" #", 1), "source"),
+            (
+                good.replace("task = \"tourniquet_on\"", "task = \"dance\""),
+                "use one of tourniquet_on, tourniquet_off",
+            ),
+            (good.replace("purpose = \"blood-draw\"\n", ""), "has no purpose"),
+            (good.replace("purpose = \"blood-draw\"", "purpose = \"dance\""), "dance"),
         ] {
             let source = Text { origin: "p.toml".into(), text: wrong };
             let said = Procedure::parse(&source, &adult()).expect_err(hint).to_string();

@@ -3,7 +3,6 @@
 use crate::output;
 use crate::serving::stop_on_signals;
 use clap::Args;
-use control_core::Device;
 use device_sim::error::Error;
 use device_sim::session::Session;
 use server::class::board::{Board, Sent};
@@ -89,12 +88,17 @@ impl ClassFlags {
     }
 
     /// Joins the class if one was given, and says so.
-    pub(crate) fn join(&self, session: &Session, device: Device) -> Result<Option<Membership>, Error> {
+    pub(crate) fn join(&self, session: &Session) -> Result<Option<Membership>, Error> {
         let Some(meeting) = self.meeting() else { return Ok(None) };
         let name = self.class_as.clone().unwrap_or_else(computer);
-        let membership = class::join(session.clone(), device, &meeting, &name).map_err(Error::failed)?;
+        let membership = class::join(session.clone(), &meeting, &name).map_err(Error::failed)?;
         say!("class {} at {} as {name}", meeting.class, meeting.address);
         Ok(Some(membership))
+    }
+
+    /// True if the run joins a class.
+    pub(crate) fn is_wanted(&self) -> bool {
+        self.class.is_some()
     }
 
     fn meeting(&self) -> Option<Meeting> {

@@ -127,7 +127,6 @@ impl From<ModelName> for Model {
 
 /// The device, the patient and the procedure of a run.
 struct Chosen {
-    device: Device,
     /// The device's part as its file has it.
     part: Option<DeviceConfig>,
     profile: Profile,
@@ -152,8 +151,8 @@ impl Run {
         // The port is taken before the file is made: a page that cannot be served must not cost a
         // recording.
         let _streams = self.streams.serve(&session)?;
-        let _class = self.class.join(&session, chosen.device)?;
-        let looks = (!self.headless).then(|| session.subscribe());
+        let _class = self.class.join(&session)?;
+        let looks = (!self.headless || self.class.is_wanted()).then(|| session.subscribe());
         let _server = if self.headless { None } else { Some(serve_for_practice(session, self.address())?) };
         let recorder = self.record.as_ref().map(|path| Recorder::create(path, &setup)).transpose()?;
         let limit = seconds.map(|s| (s * f64::from(TICK_HZ)).round() as u64);
@@ -189,8 +188,8 @@ impl Run {
             None => profile,
         };
         let wanted = self.procedure.clone().unwrap_or_else(|| profile.procedure.clone());
-        let procedure = Procedure::find(&wanted, &profile)?;
-        Ok(Chosen { device, part, profile, wanted, procedure })
+        let (procedure, profile) = Procedure::entering(&wanted, profile)?;
+        Ok(Chosen { part, profile, wanted, procedure })
     }
 
     /// Returns the description of the run that a recording begins with.
@@ -206,12 +205,12 @@ impl Run {
             profile_origin: chosen.profile.source.origin.clone(),
             procedure: self.is_virtual().then(|| chosen.procedure.name.clone()),
             device_toml: chosen.part.as_ref().map(|part| part.source.text.clone()),
-            tasks: chosen.procedure.tasks.clone(),
+            purpose: chosen.procedure.purpose,
         }
     }
 
-    /// Builds the loop between the device and its outlets. `looks` is what the page's practice
-    /// sees.
+    /// Builds the loop between the device and its outlets. `looks` is what practice
+    /// sees, for the page and the class.
     fn run_loop<'a>(
         &self,
         chosen: &Chosen,
@@ -227,7 +226,7 @@ impl Run {
         let driver = chosen.part.iter().fold(driver, |driver, part| driver.with_device(part.command()));
         let run_loop = RunLoop::new(driver, outlets, stop).with_patients(patients);
         let run_loop = match looks {
-            Some(subscription) => run_loop.with_practice(subscription),
+            Some(subscription) => run_loop.with_practice(subscription, !self.is_virtual()),
             None => run_loop,
         };
         if self.is_virtual() || self.headless {

@@ -7,7 +7,6 @@ use device_sim::patients;
 use device_sim::profile::{BUILT_IN, Profile};
 use std::path::{Path, PathBuf};
 use training::debrief;
-use training::score::tasks::{TaskResult, Tasks};
 use training::score::{Insertion, score};
 use training::xapi::statements;
 
@@ -127,19 +126,15 @@ fn print_row(one: &Insertion) {
         optional(one.angle_rms_error_deg),
         optional(one.smoothness)
     );
-    if let Some(tasks) = &one.tasks {
-        let each: Vec<String> = tasks.list.iter().map(TaskResult::in_words).collect();
-        say!("         {}", each.join("; "));
-    }
+    say!("         {}: {}", one.verdict.goal, one.verdict.in_words());
 }
 
 fn print_total(all: &[Insertion]) {
     let count = all.len().max(1) as f64;
-    let mistakes =
-        |count: fn(&Tasks) -> u32| all.iter().filter_map(|one| one.tasks.as_ref().map(count)).sum::<u32>();
+    let errors = |critical| all.iter().map(|one| one.verdict.errors(critical)).sum::<usize>();
     let mean = |value: fn(&Insertion) -> f64| all.iter().map(value).sum::<f64>() / count;
     say!(
-        "insertions={} mean_time_s={:.2} mean_path_mm={:.2} peak_force_n={:.3} punctures={} vessels={} mean_in_lumen_s={:.2} through_far_wall={} redirections={} barriers={} spared_hits={} critical_errors={} non_critical_errors={}",
+        "insertions={} mean_time_s={:.2} mean_path_mm={:.2} peak_force_n={:.3} punctures={} vessels={} mean_in_lumen_s={:.2} through_far_wall={} redirections={} barriers={} spared_hits={} passed={} critical_errors={} non_critical_errors={}",
         all.len(),
         mean(|one| one.time_s),
         mean(|one| one.path_mm),
@@ -151,8 +146,9 @@ fn print_total(all: &[Insertion]) {
         all.iter().map(|one| one.redirections).sum::<u32>(),
         all.iter().map(|one| one.barriers).sum::<u32>(),
         all.iter().map(|one| one.spared_hits).sum::<u32>(),
-        mistakes(|tasks| tasks.critical),
-        mistakes(|tasks| tasks.non_critical)
+        all.iter().filter(|one| one.verdict.passed).count(),
+        errors(true),
+        errors(false)
     );
 }
 

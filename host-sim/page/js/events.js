@@ -14,10 +14,12 @@ function where(event, withForce) {
 
 /** An event as a person would say it; null for one that is shown elsewhere. */
 export function words(event, layers) {
-  const name = tissueName(layers[event.layer]?.name ?? "layer");
+  const layer = layers[event.layer];
+  const name = tissueName(layer?.structure ?? layer?.name ?? "layer");
   switch (event.kind) {
     case "contact": return capital(t("event.contact", { name, where: where(event, false) }));
-    case "puncture": return capital(t("event.puncture", { name, where: where(event, true) }));
+    case "puncture": if (layer?.structure === "artery") return t("event.artery", { where: where(event, true) });
+      return capital(t("event.puncture", { name, where: where(event, true) }));
     case "flashback": return t("event.flashback");
     case "far_wall": return t("event.far_wall");
     case "in_track": return capital(t("event.in_track", { name }));

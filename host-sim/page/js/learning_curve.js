@@ -41,7 +41,7 @@ export class LearningCurve {
   draw(attempts) {
     this.attempts = attempts;
     const { context: g, width, height, canvas } = this.surface;
-    const { sums, mark, passedAfter } = cumulativeSum(attempts.map((one) => one.reached));
+    const { sums, mark, passedAfter } = cumulativeSum(attempts.map((one) => one.figures.verdict.passed));
     const words = passedAfter ? t("practice.passed", { count: passedAfter }) : t("practice.not_passed", { count: attempts.length });
     canvas.setAttribute("aria-label", t("practice.curve_label", { words }));
     const [low, high] = [Math.min(mark, ...sums) - 0.3, Math.max(0, ...sums) + 0.3];

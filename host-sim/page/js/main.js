@@ -39,7 +39,7 @@ let linkStatus = null;
 /** The newest state, which is drawn. */
 const view = {
   known: false, depth: -5, force: 0, motor: 0, speed: 0, torque: 0, peak: NaN, tilt: 0.5, angle: 0.5, skinAngle: 0.5, lateral: 0, vessel: "outside", state: "idle",
-  hand: 0, person: false, seconds: 0, ghost: NaN,
+  hand: 0, person: false, seconds: 0, ghost: NaN, originX: 0, originY: 0, underSkin: 0, next: "",
 };
 /** The number of jumps of the played recording when this was drawn. */
 let jumps = 0;
@@ -68,7 +68,6 @@ const receive = {
     practice.goal(message);
   },
   task(message) {
-    practice.tasks.done(message.name);
     events.add({ ...message, kind: "task" }, scene.layers);
   },
   attempt(message) {
@@ -88,6 +87,7 @@ const receive = {
     for (const event of message.events) happen(event);
     for (const bucket of message.trace) trace.push(bucket);
     if (message.timing) panel.timing(message.timing);
+    if (message.needle) [view.originX, view.originY] = message.needle;
     const pose = message.pose;
     if (!pose) return;
     clock.hear(pose.t_s, performance.now(), jumped);
@@ -100,6 +100,7 @@ const receive = {
     view.tilt = pose.tilt_rad;
     view.angle = pose.angle_rad;
     view.skinAngle = angleToSkin(scene.body, pose.angle_rad);
+    view.underSkin = underSkin(scene.body, view);
     view.lateral = pose.lateral_n;
     view.vessel = pose.vessel;
     view.state = pose.state;
@@ -113,6 +114,12 @@ function angleToSkin(body, angle) {
   if (!body) return angle;
   const [ahead, , down] = body.inwards;
   return Math.asin(Math.min(1, Math.max(-1, ahead * Math.cos(angle) + down * Math.sin(angle))));
+}
+
+/** The distance of the tip from the skin at entry, perpendicular to it, mm. */
+function underSkin(body, { depth, angle, originX, originY }) {
+  const [ahead, , down] = body?.inwards ?? [0, 0, 1];
+  return ahead * (originX + depth * Math.cos(angle)) + down * (originY + depth * Math.sin(angle));
 }
 
 /** Nothing has happened yet: another scene, or another place in a recording. */
@@ -168,7 +175,8 @@ function draw(nowMs) {
   const condition = link.open && !scrub.playing ? "paused" : link.condition;
   const now = clock.now(performance.now());
   if (tissue) {
-    tissue.move(view.depth, view.angle, view.force, view.vessel, view.seconds);
+    tissue.move(view.depth, view.angle, view.force, view.vessel, view.seconds, view.originY);
+    view.next = practice.next;
     view.ghost = practice.ghost(now);
     if (!body.open) section.draw(view, tissue);
     body.draw(view);

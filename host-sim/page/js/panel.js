@@ -99,7 +99,7 @@ export class Panel {
   show(view, link, condition, nowMs) {
     const known = view.known;
     write(byId("depth"), known ? number(view.depth, 2) : "–");
-    write(byId("under-skin"), known ? number(Math.max(0, view.depth * Math.sin(view.skinAngle)), 2) : "–");
+    write(byId("under-skin"), known ? number(Math.max(0, view.underSkin), 2) : "–");
     write(byId("motor-force"), known ? number(view.motor, 2) : "–");
     write(byId("force"), known ? number(view.force, 2) : "–");
     write(byId("speed"), known ? number(view.speed, 1) : "–");

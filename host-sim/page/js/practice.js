@@ -1,9 +1,9 @@
-// Practice: records, shows the verdict after each withdrawal, the attempts with what was better or worse than the best so far, and the
-// learning curve. The server judges; see host-sim/training/src/practice.rs.
+// Practice: the steps of the goal, the verdict after each withdrawal, the attempts with what was better or worse than the best so far,
+// recording and the learning curve. The server judges; see host-sim/training/src/verdict.rs.
 
 import { LearningCurve } from "./learning_curve.js";
 import { number, said, t } from "./language.js";
-import { mistakes, Tasks } from "./tasks.js";
+import { Tasks } from "./tasks.js";
 
 const byId = (id) => document.getElementById(id);
 /** Columns of the list: the key of their heading, the name of the figure, its digits. */
@@ -11,13 +11,7 @@ const COLUMNS = [
   ["practice.time", "time_s", 1],
   ["practice.force", "peak_force_n", 2],
   ["practice.in_vein", "in_lumen_s", 1],
-  ["practice.angle", "angle_rms_error_deg", 1],
-  ["practice.hits", "spared_hits", 0],
 ];
-/** Keys of the meanings of short headings. */
-const TITLES = { spared_hits: "practice.hits_title", angle_rms_error_deg: "practice.angle_title" };
-/** Columns that are only shown where the goal has a limit for them. */
-const WITH_TARGET_ONLY = new Set(["in_lumen_s"]);
 /** A figure that differs from the best one by less than this share is as good. */
 const SAME = 0.05;
 
@@ -38,25 +32,14 @@ export class Practice {
     this.record.addEventListener("click", () => this.askForRecording());
     byId("view-events").addEventListener("click", () => this.show(false));
     byId("view-practice").addEventListener("click", () => this.show(true));
-    /** The limits of the goal by the names of the figures: `{ at_least }` or `{ at_most }`. */
-    this.targets = {};
+    /** The next step in words; empty where all are done. */
+    this.next = "";
     this.head();
   }
 
-  get columns() {
-    return COLUMNS.filter(([, key]) => this.targets[key] || !WITH_TARGET_ONLY.has(key));
-  }
-
-  /** The headings; below the name of a figure its limit. */
   head() {
-    const cell = (name, key) => {
-      const title = TITLES[key] ? t(TITLES[key]) : "";
-      const head = Object.assign(document.createElement("th"), { textContent: name, scope: "col", title });
-      const target = this.targets[key];
-      if (target) head.append(document.createElement("br"), target.at_least === undefined ? `≤ ${limit(target.at_most)}` : `≥ ${limit(target.at_least)}`);
-      return head;
-    };
-    byId("attempts-head").replaceChildren(cell(""), cell(t("practice.goal")), ...this.columns.map(([name, key]) => cell(t(name), key)));
+    const cell = (textContent) => Object.assign(document.createElement("th"), { textContent, scope: "col" });
+    byId("attempts-head").replaceChildren(cell(""), cell(t("practice.goal")), ...COLUMNS.map(([name]) => cell(t(name))));
   }
 
   /** Goes to the practice or back to the events. */
@@ -68,45 +51,40 @@ export class Practice {
     byId("view-practice").setAttribute("aria-pressed", String(open));
   }
 
-  /** The server judges: what insertions are for. */
-  goal(message) {
+  /** The server judges: what an insertion is for, and how the present one goes. */
+  goal({ goal, patient, purpose, steps, next }) {
     byId("list-views").hidden = false;
     byId("events-title").hidden = true;
-    this.patient = message.patient;
-    byId("goal").textContent = `${said(message.goal)}.`;
-    this.targets = message.targets ?? {};
-    this.tasks.follow(message.tasks ?? []);
-    this.head();
-    this.list();
+    const isNew = this.patient !== patient || this.purpose !== purpose;
+    Object.assign(this, { patient, purpose, next: next === null ? "" : said(steps[next].words) });
+    write(byId("goal"), `${said(goal)}.`);
+    this.tasks.follow(steps, next);
+    if (isNew) this.list();
   }
 
   /** An insertion has ended. After a reconnection all are reported again. */
   ended(attempt) {
     if (attempt.number === 1) this.attempts.length = 0;
     this.attempts.push(attempt);
-    this.tasks.forget();
     if (attempt.by_person) this.say(attempt);
     this.list();
     this.curve.draw(this.attempts.filter((one) => one.by_person));
   }
 
-  say(attempt) {
+  say({ number: which, figures }) {
+    const { passed, reasons } = figures.verdict;
     const verdict = byId("verdict");
-    const { figures } = attempt;
-    verdict.dataset.tone = attempt.reached ? "good" : "bad";
-    const missing = attempt.missing.map(said).join("; ");
-    const what = attempt.reached ? t("practice.goal_reached") : t("practice.not_reached", { missing });
-    const others = mistakes(figures.tasks);
-    const also = others ? t("practice.not_critical", { mistakes: others }) : "";
+    verdict.dataset.tone = passed ? "good" : "bad";
+    const missing = reasons.map(({ words }) => said(words)).join("; ");
+    const what = passed ? t("practice.goal_reached") : missing ? t("practice.not_reached", { missing }) : t("practice.not_finished");
     const [time, force] = [number(figures.time_s, 1), number(figures.peak_force_n, 2)];
-    verdict.textContent = t("practice.verdict", { number: attempt.number, what, time, force, also });
+    verdict.textContent = t("practice.verdict", { number: which, what, time, force });
   }
 
-  /** The best insertion into this patient: reached, and the quickest; a person's where there is one, else the scripted hand's. */
+  /** A person's best insertion into this patient: passed, and the quickest. */
   get best() {
-    const reached = this.attempts.filter((one) => one.reached && one.patient === this.patient);
-    const own = reached.filter((one) => one.by_person);
-    return (own.length ? own : reached).reduce((best, one) => (best && best.figures.time_s <= one.figures.time_s ? best : one), null);
+    const own = this.attempts.filter((one) => one.by_person && one.figures.verdict.passed && one.patient === this.patient);
+    return own.reduce((best, one) => (best && best.figures.time_s <= one.figures.time_s ? best : one), null);
   }
 
   /** Newest first; figures are marked as better or worse than those of the best. */
@@ -121,10 +99,11 @@ export class Practice {
         if (tone) cell.dataset.tone = tone;
       };
       cell(`${attempt.number}${attempt.by_person ? "" : t("practice.demo")}${attempt === best ? " ★" : ""}`);
-      cell(t(attempt.reached ? "practice.reached" : "practice.missed"), attempt.reached ? "good" : "bad");
-      for (const [, key, digits] of this.columns) {
-        const wanted = best && best !== attempt && best.patient === attempt.patient ? best.figures[key] : null;
-        cell(...compared(attempt.figures[key], wanted, digits, this.targets[key]));
+      const { passed } = attempt.figures.verdict;
+      cell(t(passed ? "practice.reached" : "practice.missed"), passed ? "good" : "bad");
+      for (const [, key, digits] of COLUMNS) {
+        const isComparable = best && best !== attempt && best.patient === attempt.patient && key !== "in_lumen_s";
+        cell(...compared(attempt.figures[key], isComparable ? best.figures[key] : null, digits));
       }
       return row;
     });
@@ -133,7 +112,10 @@ export class Practice {
 
   /** Follows the events of the device: when the needle has touched the skin. */
   happen(event) {
-    if (event.kind === "contact" && event.layer === 0) this.touchedAt = event.t_s;
+    if (event.kind === "contact" && event.layer === 0) {
+      this.touchedAt = event.t_s;
+      byId("verdict").textContent = "";
+    }
     if (event.kind === "exit" && event.layer === 0) this.touchedAt = NaN;
   }
 
@@ -165,15 +147,14 @@ export class Practice {
   }
 }
 
-/** The limit of a figure, with as many digits as it has. */
-const limit = (value) => number(value, Number.isInteger(value) ? 0 : 1);
+function write(element, text) {
+  if (element.textContent !== text) element.textContent = text;
+}
 
-/** A figure, and whether it is beyond its limit, or better or worse than the wanted one: less is, unless the limit is a least one. */
-function compared(value, wanted, digits, target) {
+/** A figure, and whether it is better or worse than the wanted one: less is. */
+function compared(value, wanted, digits) {
   if (value === null || value === undefined) return ["–"];
   const text = number(value, digits);
-  if (target && (value < target.at_least || value > target.at_most)) return [`${text} ✗`, "bad"];
   if (wanted === null || wanted === undefined || Math.abs(value - wanted) <= SAME * Math.abs(wanted)) return [text];
-  const better = target?.at_least === undefined ? value < wanted : value > wanted;
-  return better ? [t("practice.better", { value: text }), "good"] : [t("practice.worse", { value: text }), "bad"];
+  return value < wanted ? [t("practice.better", { value: text }), "good"] : [t("practice.worse", { value: text }), "bad"];
 }

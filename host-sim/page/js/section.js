@@ -1,5 +1,5 @@
 // The needle in a section of the body. Millimetres with the entry point at 0, x along the skin, y perpendicular to it, down: layers and
-// vessel stay where they are, and the needle turns about the entry point. The vessel runs along the section; the inset cuts across it.
+// vessel stay where they are, and the needle turns about the point that tissue holds: its line has depth 0 at `axis.from`. The vessel runs along the section; the inset cuts across it.
 
 import { surface } from "./canvas.js";
 import { drawInset } from "./inset.js";
@@ -25,7 +25,7 @@ export class Section {
     this.small = small;
     this.surface = surface(canvas);
     this.colours = colours;
-    this.axis = { x: 1, y: 0, angle: NaN };
+    this.axis = { x: 1, y: 0, angle: NaN, fromX: 0, fromY: 0 };
     this.scale = NaN;
     this.origin = { x: 0, y: 0 };
     this.point = { x: 0, y: 0 };
@@ -57,7 +57,18 @@ export class Section {
     this.names(g, tissue, width, height);
     this.scaleBar(g, width, height);
     if (tissue.vessel) this.inset(g, view, tissue, width);
+    this.next(g, view);
     this.note(view, tissue);
+  }
+
+  /** The next step of the goal. */
+  next(g, view) {
+    if (!view.next || this.small) return;
+    g.font = `600 15px ${this.colours.font}`;
+    g.textAlign = "left";
+    g.textBaseline = "top";
+    g.fillStyle = this.colours.text;
+    g.fillText(t("section.next", { step: view.next }), 12, 12);
   }
 
   /** Sets the view: tip and hub are in it, and the layers do not move while the needle goes in. */
@@ -69,6 +80,8 @@ export class Section {
     this.axis.angle = come(this.axis.angle, view.angle);
     this.axis.x = Math.cos(this.axis.angle);
     this.axis.y = Math.sin(this.axis.angle);
+    this.axis.fromX = come(this.axis.fromX, view.originX ?? 0);
+    this.axis.fromY = come(this.axis.fromY, view.originY ?? 0);
     if (!this.held || resized) {
       const wanted = this.wanted(view.depth, tissue, width, height);
       this.scale = come(this.scale, wanted.scale);
@@ -100,20 +113,21 @@ export class Section {
 
   /** Held, or quicker than the picture follows: it shifts rather than lose the tip or a corner of the hub. */
   keepInSight(depth, needle, width, height) {
-    const { x, y } = this.axis;
+    const { x, y, fromX, fromY } = this.axis;
     const edge = MARGIN_MM * this.scale;
     const shift = (low, high, room) => Math.max(0, edge - low) - Math.max(0, high - (room - edge));
     const end = depth - wholeLength(needle);
     const hub = halfHub(needle);
-    this.origin.x += shift(this.x(end * x - hub * y), this.x(depth * x), width);
-    this.origin.y += shift(this.y(end * y - hub * x), this.y(depth * y), height);
+    this.origin.x += shift(this.x(fromX + end * x - hub * y), this.x(fromX + depth * x), width);
+    this.origin.y += shift(this.y(fromY + end * y - hub * x), this.y(fromY + depth * y), height);
   }
 
   /** Says what was drawn where. */
   note(view, tissue) {
     const { drawn } = this;
     const { unit } = this.surface;
-    const place = (mm) => ({ x: unit * this.x(mm * this.axis.x), y: unit * this.y(mm * this.axis.y) });
+    const { x, y, fromX, fromY } = this.axis;
+    const place = (mm) => ({ x: unit * this.x(fromX + mm * x), y: unit * this.y(fromY + mm * y) });
     drawn.scale = unit * this.scale;
     drawn.angle = this.axis.angle;
     drawn.tops = tissue.layers.map((layer) => unit * this.y(layer.depth_mm));
@@ -285,7 +299,8 @@ export class Section {
 
   /** From here on x runs along the needle from `mm` past the entry point, in CSS pixels. */
   alongNeedle(g, mm) {
-    g.translate(this.x(mm * this.axis.x), this.y(mm * this.axis.y));
+    const { x, y, fromX, fromY } = this.axis;
+    g.translate(this.x(fromX + mm * x), this.y(fromY + mm * y));
     g.rotate(this.axis.angle);
   }
 
@@ -346,7 +361,7 @@ export class Section {
     const narrow = width < NARROW;
     const wide = narrow ? 112 : Math.min(240, 0.2 * width);
     const high = Math.min(0.92 * this.origin.y, 0.62 * wide);
-    if (high > 40) drawInset(g, this.colours, { right: width - 8, wide, high }, tissue, view.depth * this.axis.y, narrow);
+    if (high > 40) drawInset(g, this.colours, { right: width - 8, wide, high }, tissue, this.axis.fromY + view.depth * this.axis.y, narrow);
   }
 
   scaleBar(g, width, height) {

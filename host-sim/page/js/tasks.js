@@ -1,51 +1,56 @@
-// The tasks of a procedure in addition to moving the needle (tourniquet, plunger, catheter): a
-// button for each. The server reports what was done, because the scripted hand does them too.
+// The steps of the goal: a list that the server ticks, the next one highlighted, and a button for each step that a person reports
+// (tourniquet, catheter, plunger). The server says what was done, because the scripted hand does steps too.
 
-import { capital, t, taskName } from "./language.js";
+import { said } from "./language.js";
 
 const byId = (id) => document.getElementById(id);
-
-const PLACES = { target: "task.at_target", outside: "task.at_outside", any: "task.at_any" };
-/** Mistakes that are not critical, as clauses. */
-const MISTAKES = { missed: "practice.task_missed", wrong_place: "practice.task_place", wrong_order: "practice.task_order" };
+const MARKS = { open: "○", done: "✓", wrong: "✗" };
 
 export class Tasks {
   /** @param {import("./link.js").Link} link where wishes go */
   constructor(link) {
     this.link = link;
+    this.list = byId("steps");
     this.box = byId("tasks");
-    this.buttons = new Map();
+    this.items = [];
+    this.shown = "";
   }
 
-  /** Shows the buttons of the procedure's tasks, in their order. */
-  follow(tasks) {
-    this.buttons = new Map(tasks.map(({ name, tip }) => [name, this.button(name, tip)]));
-    this.box.replaceChildren(...this.buttons.values());
-    this.box.hidden = tasks.length === 0;
+  /** Shows the steps, in their order, and which of them is `next`, or null. */
+  follow(steps, next) {
+    const shown = steps.map(({ words }) => words).join("\n");
+    if (shown !== this.shown) this.build(steps);
+    this.shown = shown;
+    for (const [i, { state }] of steps.entries()) {
+      const { item, mark, button } = this.items[i];
+      mark.textContent = MARKS[state] ?? "";
+      for (const element of button ? [item, button] : [item]) {
+        element.dataset.state = state;
+        element.dataset.next = String(i === next);
+      }
+      if (i === next) item.setAttribute("aria-current", "step");
+      else item.removeAttribute("aria-current");
+    }
   }
 
-  button(name, tip) {
-    const button = Object.assign(document.createElement("button"), { type: "button", textContent: capital(taskName(name)), title: PLACES[tip] ? t(PLACES[tip]) : "" });
-    button.dataset.task = name;
-    button.addEventListener("click", () => this.link.send({ do: "task", name }));
+  build(steps) {
+    this.items = steps.map(({ words, task }) => {
+      const item = document.createElement("li");
+      const mark = Object.assign(document.createElement("span"), { className: "mark" });
+      mark.ariaHidden = "true";
+      item.append(mark, said(words));
+      return { item, mark, button: task ? this.button(words, task) : null };
+    });
+    this.list.replaceChildren(...this.items.map(({ item }) => item));
+    const buttons = this.items.map(({ button }) => button).filter(Boolean);
+    this.box.replaceChildren(...buttons);
+    this.box.hidden = buttons.length === 0;
+  }
+
+  button(words, task) {
+    const button = Object.assign(document.createElement("button"), { type: "button", textContent: said(words) });
+    button.dataset.task = task;
+    button.addEventListener("click", () => this.link.send({ do: "task", name: task }));
     return button;
   }
-
-  /** The task was done. */
-  done(name) {
-    const button = this.buttons.get(name);
-    if (button) button.dataset.done = "true";
-  }
-
-  /** A new insertion: nothing has been done. */
-  forget() {
-    for (const button of this.buttons.values()) delete button.dataset.done;
-  }
-}
-
-/** Returns the mistakes of an insertion that are not critical, as a clause; empty if there are no
- *  such mistakes. */
-export function mistakes(tasks) {
-  const wrong = (tasks?.list ?? []).filter((one) => one.mistake && !one.is_critical);
-  return wrong.map((one) => t(MISTAKES[one.mistake], { task: taskName(one.name) })).join(", ");
 }

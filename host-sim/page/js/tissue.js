@@ -42,21 +42,25 @@ export class Tissue {
     const layer = this.layers[event.layer];
     if (!layer) return;
     if (event.kind === "contact") layer.touched = true;
-    if (["puncture", "vessel", "in_track"].includes(event.kind)) layer.touched = layer.given = true;
+    if (["puncture", "vessel", "in_track"].includes(event.kind)) {
+      layer.touched = layer.given = true;
+      if (layer.structure === "artery") this.flashback = true;
+    }
     if (event.kind === "exit") {
       layer.touched = layer.given = false;
       if (event.layer === 0) this.flashback = false;
     }
   }
 
-  /** Follows the depth along the needle at `angle` to the skin, and what the device says of the vessel. */
-  move(depth, angle, force, place, seconds) {
+  /** Follows the depth along the needle at `angle` to the skin, whose line has depth 0 at `originY` mm below it, and what the device says
+   *  of the vessel. */
+  move(depth, angle, force, place, seconds, originY = 0) {
     this.place = place;
     if (place === "in_lumen") this.flashback = true;
     const relaxed = 1 - Math.exp(-seconds / RECOVERY_S);
     const sine = Math.sin(Math.max(angle, FLATTEST));
     for (const layer of this.layers) {
-      layer.along = layer.depth_mm / sine;
+      layer.along = (layer.depth_mm - originY) / sine;
       if (layer.puncture_travel_mm === null) continue;
       const past = depth - layer.along;
       if (layer.touched && !layer.given && past > 0) {
@@ -92,8 +96,8 @@ export function displace(tissue, axis, x, y, out) {
   for (const layer of tissue.layers) {
     if (layer.dent === 0) continue;
     const reach = layer.of_vessel ? REACH_VESSEL_MM : REACH_SKIN_MM;
-    const dx = (x - layer.along * axis.x) / reach;
-    const dy = (y - layer.along * axis.y) / reach;
+    const dx = (x - axis.fromX - layer.along * axis.x) / reach;
+    const dy = (y - axis.fromY - layer.along * axis.y) / reach;
     const share = layer.dent / (1 + dx * dx + dy * dy);
     out.x += share * axis.x;
     out.y += share * axis.y;

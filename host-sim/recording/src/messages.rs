@@ -5,7 +5,7 @@ use control_core::config::DacWidth;
 use control_core::controller::Sample;
 use control_core::event::{Fault, Limits};
 use control_core::units::{Millimetres, MillimetresPerSecond, MillinewtonMetres, Milliradians, Newtons};
-use device_sim::procedure::task::Task;
+use device_sim::procedure::purpose::Purpose;
 use device_sim::session::{ProbeView, TaskDone};
 use fixed::types::{I2F30, I16F16};
 use link::build::Build;
@@ -41,9 +41,9 @@ pub struct Setup {
     /// where it was the device's own.
     #[serde(default)]
     pub device_toml: Option<String>,
-    /// The tasks that the procedure asks for; empty in a recording from before they were recorded.
+    /// The procedure's purpose; none in a recording from before it was recorded.
     #[serde(default)]
-    pub tasks: Vec<Task>,
+    pub purpose: Option<Purpose>,
 }
 
 /// The device's identity and scale.

@@ -9,7 +9,7 @@ use recording::read::Recording;
 use recording::stretches::{Stretch, stretches};
 use std::ops::Range;
 use training::score::target::Reached;
-use training::score::{Judge, spans};
+use training::score::{Insertion, Judge};
 
 /// A procedure as it was recorded, in one piece.
 pub(super) struct Trace {
@@ -63,22 +63,29 @@ impl Trace {
         (from..self.len()).find(|index| self.depth_at(*index) < begin - 1.0).unwrap_or(from)
     }
 
+    /// Index after `from` at which the tip comes within 0.5 mm of the deepest place that it reaches
+    /// before it is drawn back by a mm.
+    pub(super) fn nearly_turning(&self, from: usize) -> usize {
+        let mut deepest = self.depth_at(from);
+        for index in from..self.len() {
+            let depth = self.depth_at(index);
+            if depth < deepest - 1.0 {
+                break;
+            }
+            deepest = deepest.max(depth);
+        }
+        (from..self.len()).find(|index| self.depth_at(*index) >= deepest - 0.5).unwrap_or(from)
+    }
+
     /// Index at `seconds`.
     pub(super) fn index(&self, seconds: f64) -> usize {
         ((seconds * f64::from(TICK_HZ)) as usize).min(self.len().saturating_sub(1))
     }
 
-    /// Index at which the tip comes within 0.5 mm of the deepest place: before it rests there.
-    pub(super) fn nearly_deepest(&self) -> usize {
-        let depth = self.depth_at(self.deepest()) - 0.5;
-        (0..self.len()).find(|index| self.depth_at(*index) >= depth).unwrap_or(0)
-    }
-
     /// Largest force across the needle that would have held its direction, N; none without a
     /// fixture.
     pub(super) fn largest_lateral_n(&self, profile: &Profile) -> Option<f64> {
-        let judge = Judge::new(profile, &[], self.stretch.first_tick);
-        spans(&self.stretch).into_iter().find_map(|span| judge.insertion(span).largest_lateral_n)
+        self.insertions(profile).into_iter().find_map(|one| one.largest_lateral_n)
     }
 
     /// Index at which the needle has come to rest after `from`: not a count for a tenth of a
@@ -95,8 +102,12 @@ impl Trace {
 
     /// Returns the result for the patient's target in the first insertion.
     pub(super) fn target(&self, profile: &Profile) -> Option<Reached> {
-        let judge = Judge::new(profile, &[], self.stretch.first_tick);
-        spans(&self.stretch).into_iter().find_map(|span| judge.insertion(span).target)
+        self.insertions(profile).into_iter().find_map(|one| one.target)
+    }
+
+    fn insertions(&self, profile: &Profile) -> Vec<Insertion> {
+        let judge = Judge::new(profile, None, self.stretch.first_tick);
+        judge.spans(&self.stretch).into_iter().map(|(span, _)| judge.insertion(span)).collect()
     }
 
     /// Way of the tip in mm, and the force across the needle that would hold its direction of

@@ -78,7 +78,7 @@ pub(super) fn sheet(dir: &Path) -> Result<Sheet, Error> {
     for words in [
         "The forces of the withdrawal are “of the same kind, in the opposite direction”: no number. Ours have their own magnitudes in the patient's file.",
         "The coefficients of the polynomial before the puncture and of the friction are other papers'. Depths of the layers are not given: ours stand in the patient's file with their sources.",
-        "The place of the bursa along the skin: the patient's file says from where to where. In the first injection the needle goes in at 37° and passes beside it, is drawn back by 20 mm, turned to 45°, and reaches it. Layers of the device go on for ever: beside the bursa the hand feels its cutting force all the same.",
+        "The place of the bursa along the skin: the patient's file says from where to where. In the first injection the needle goes in at 37° and passes beside it, is drawn back by 20 mm, turned to 45°, and reaches it. The device is told where the line of the needle meets the layers: beside the bursa the hand feels none.",
         "Need 1 asks for a free entry point, and the conclusion says that it is fixed: here the procedure chooses it.",
     ] {
         sheet.paragraph(words);
@@ -173,8 +173,9 @@ fn rows(profile: &Profile, traces: &[Trace]) -> Vec<Row> {
 fn plateau_in(trace: &Trace, layer: u8) -> Option<f64> {
     let deepest = trace.deepest();
     let begin = trace.last_event(deepest, is_contact_with(layer))?;
-    let end =
-        trace.event(begin, is_contact_with(layer + 1)).unwrap_or_else(|| trace.nearly_deepest()).min(deepest);
+    // The next layer may be met only on another way in.
+    let turning = trace.nearly_turning(begin);
+    let end = trace.event(begin, is_contact_with(layer + 1)).map_or(turning, |next| next.min(turning));
     trace.mean_n(begin + (end - begin) * 2 / 3..end)
 }
 

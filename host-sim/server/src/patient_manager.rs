@@ -131,7 +131,7 @@ impl PatientManager {
         self.profile = profile;
         // Where no hand is simulated, the patient's own procedure says what a person has to do.
         let own = || Procedure::find(&self.profile.procedure, &self.profile).ok();
-        self.setup.tasks = self.procedure().or_else(own).map_or_else(Vec::new, |procedure| procedure.tasks);
+        self.setup.purpose = self.procedure().or_else(own).and_then(|procedure| procedure.purpose);
         if let Some(procedure) = self.procedure() {
             self.setup.procedure = Some(procedure.name);
         }
@@ -172,7 +172,7 @@ impl PatientManager {
             can_save: self.saved.is_some(),
             // What has been parsed as a profile is TOML, and TOML is JSON but for its dates.
             profile: toml::from_str(&self.profile.source.text).unwrap_or_default(),
-            tasks: self.setup.tasks.clone(),
+            purpose: self.setup.purpose,
             answer,
         }
     }
@@ -198,7 +198,7 @@ mod tests {
             profile_origin: String::new(),
             procedure: Some("venepuncture".into()),
             device_toml: None,
-            tasks: Vec::new(),
+            purpose: None,
         };
         PatientManager::new(profile, Source::Virtual, Some("venepuncture".into()), setup)
     }

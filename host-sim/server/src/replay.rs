@@ -2,8 +2,9 @@
 //! person chooses.
 
 use control_core::TICK_HZ;
+use device_sim::needle::NeedleTrack;
 use device_sim::session::{Control, Publisher, ReplayStatus};
-use recording::messages::Message;
+use recording::messages::{Message, Setup};
 use recording::read::Recording;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -35,6 +36,8 @@ pub struct Replay<'a> {
     /// all of it.
     times: Vec<u64>,
     length: u64,
+    /// The needle in the patient of the recording, if that is known.
+    track: Option<NeedleTrack>,
 }
 
 impl<'a> Replay<'a> {
@@ -54,6 +57,7 @@ impl<'a> Replay<'a> {
             frames: 0,
             times,
             length,
+            track: track(recording, &recording.setup),
         }
     }
 
@@ -107,6 +111,7 @@ impl<'a> Replay<'a> {
 
     fn rewind(&mut self) {
         self.next = 0;
+        self.track = track(self.recording, &self.recording.setup);
         self.last_tick = None;
     }
 
@@ -136,7 +141,9 @@ impl<'a> Replay<'a> {
             }
         }
         let mut events = Vec::new();
+        self.track = track(self.recording, &self.recording.setup);
         for message in &self.recording.messages[..self.next] {
+            self.follow(message);
             match message {
                 Message::Hello(said) => hello = Some(said),
                 Message::Event(event) => events.push(*event),
@@ -165,8 +172,23 @@ impl<'a> Replay<'a> {
         }
     }
 
+    /// Follows the needle.
+    fn follow(&mut self, message: &Message) {
+        match (message, &mut self.track) {
+            (Message::Setup(setup), _) => self.track = track(self.recording, setup),
+            (Message::Pose(pose), Some(track)) => {
+                let pose = pose.to_frame();
+                track.move_to(pose.depth.0.to_num(), f64::from(pose.angle.0) * 1e-3);
+            }
+            (Message::Event(event), Some(track)) => track.happen(&event.kind),
+            _ => {}
+        }
+    }
+
     fn publish(&mut self, message: &Message) {
         self.frames += 1;
+        self.follow(message);
+        self.track.iter().for_each(|track| self.publisher.needle(track.origin_mm()));
         match message {
             Message::Hello(hello) => self.publisher.hello(&hello.to_frame()),
             Message::Samples(block) => {
@@ -185,6 +207,11 @@ impl<'a> Replay<'a> {
             Message::Setup(_) | Message::Probe(_) => {}
         }
     }
+}
+
+/// Returns a needle outside the patient of `setup`.
+fn track(recording: &Recording, setup: &Setup) -> Option<NeedleTrack> {
+    recording.profile_of(setup).ok().map(|profile| NeedleTrack::new(&profile))
 }
 
 /// True if the device restarted, or was silent for too long to wait for.

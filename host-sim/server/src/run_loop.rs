@@ -11,6 +11,8 @@ use device_sim::device::{Port, Wire};
 use device_sim::driver::Driver;
 use device_sim::error::Error;
 use device_sim::lockstep;
+use device_sim::needle::LineSender;
+use device_sim::profile::Profile;
 use device_sim::session::{Control, PatientAnswer, Subscription};
 use recording::run_stats::RunStats;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -46,6 +48,8 @@ pub struct RunLoop<'a> {
     patients: Option<PatientManager>,
     /// The practice that judges insertions while somebody looks.
     practice: Option<Practice>,
+    /// The needle in its patient, if that is known.
+    needle: Option<LineSender>,
 }
 
 /// The totals of a run.
@@ -72,6 +76,7 @@ impl<'a> RunLoop<'a> {
             clears_first: false,
             patients: None,
             practice: None,
+            needle: None,
         }
     }
 
@@ -94,17 +99,24 @@ impl<'a> RunLoop<'a> {
     }
 
     /// A person may change the patient in the page.
-    pub fn with_patients(mut self, patients: PatientManager) -> Self {
-        self.outlets.publisher.patient(&patients.status(None));
-        self.patients = Some(patients);
+    pub fn with_patients(self, patients: PatientManager) -> Self {
+        let mut following = self.following(patients.profile());
+        following.outlets.publisher.patient(&patients.status(None));
+        following.patients = Some(patients);
+        following
+    }
+
+    /// The device is told where a needle that turns in this patient meets its layers.
+    pub fn following(mut self, profile: &Profile) -> Self {
+        self.needle = Some(LineSender::new(profile));
         self
     }
 
-    /// Insertions are judged while somebody looks.
-    pub fn with_practice(mut self, subscription: Subscription) -> Self {
+    /// Insertions are judged while somebody looks. A person holds the needle of a real device.
+    pub fn with_practice(mut self, subscription: Subscription, is_real: bool) -> Self {
         self.practice = self.patients.as_ref().map(|patients| {
-            let tasks = &patients.setup().tasks;
-            Practice::new(subscription, patients.profile(), tasks, &self.outlets.publisher)
+            let purpose = patients.setup().purpose;
+            Practice::new(subscription, patients.profile(), purpose, is_real)
         });
         self
     }
@@ -129,11 +141,9 @@ impl<'a> RunLoop<'a> {
             for _ in 0..lockstep::TICKS {
                 device.tick();
             }
-            lockstep::empty(
-                |frame| device.transmit(frame),
-                |bytes| self.driver.receive(now, bytes, |frame| self.outlets.frame(frame)),
-            );
-            device.take_done().into_iter().for_each(|name| self.outlets.task(name));
+            lockstep::empty(|frame| device.transmit(frame), |bytes| self.receive(now, bytes));
+            self.follow_needle(now);
+            device.take_done().into_iter().for_each(|name| self.outlets.task(name.to_owned()));
             if let Some(taken) = self.patient_answer() {
                 let procedure = self.patients.as_ref().filter(|_| taken).and_then(PatientManager::procedure);
                 procedure.into_iter().for_each(|procedure| device.follow(procedure));
@@ -227,8 +237,29 @@ impl<'a> RunLoop<'a> {
             wire.write(out)?;
         }
         let count = wire.read(bytes, PATIENCE)?;
-        self.driver.receive(begin.elapsed(), &bytes[..count], |f| self.outlets.frame(f));
+        self.receive(begin.elapsed(), &bytes[..count]);
+        self.follow_needle(begin.elapsed());
         Ok(())
+    }
+
+    /// Gives the frames in `bytes` to all that follow the device.
+    fn receive(&mut self, now: Duration, bytes: &[u8]) {
+        let Self { driver, outlets, needle, .. } = self;
+        driver.receive(now, bytes, |frame| {
+            outlets.frame(frame);
+            needle.iter_mut().for_each(|needle| needle.frame(frame));
+        });
+    }
+
+    /// Tells the device and the pages where the needle's line is, where it has moved.
+    fn follow_needle(&mut self, now: Duration) {
+        let Some(needle) = &mut self.needle else { return };
+        self.outlets.publisher.needle(needle.track().origin_mm());
+        if self.driver.is_ready(now)
+            && let Some(line) = needle.due(now)
+        {
+            self.driver.line(line);
+        }
     }
 
     /// Takes the torque off before the cable is let go; the heartbeat's silence would do it 200 ms
@@ -313,8 +344,8 @@ impl<'a> RunLoop<'a> {
 
     /// A person has done a task; one that the procedure does not ask for is not noted.
     fn task(&mut self, name: String) {
-        let tasks = self.patients.as_ref().map_or(&[][..], |patients| &patients.setup().tasks);
-        if tasks.iter().any(|task| task.name == name) {
+        let purpose = self.patients.as_ref().and_then(|patients| patients.setup().purpose);
+        if purpose.is_some_and(|purpose| purpose.tasks().contains(&name.as_str())) {
             self.outlets.task(name);
         }
     }
@@ -339,8 +370,9 @@ impl<'a> RunLoop<'a> {
         let taken = answer.is_ok().then(|| patients.taken()).flatten();
         if taken.is_some() {
             self.outlets.publisher.scene(&patients.scene());
+            self.needle = Some(LineSender::new(patients.profile()));
             if let Some(practice) = &mut self.practice {
-                practice.patient(patients.profile(), &patients.setup().tasks, &self.outlets.publisher);
+                practice.patient(patients.profile(), patients.setup().purpose);
             }
             let written = self.outlets.recorder.as_mut().map_or(Ok(()), |r| r.setup(patients.setup()));
             if let Err(error) = written {

@@ -43,7 +43,7 @@ fn record_with(
         profile_origin: profile.source.origin.clone(),
         procedure: Some(procedure.name.clone()),
         device_toml: None,
-        tasks: procedure.tasks.clone(),
+        purpose: procedure.purpose,
     };
     let recorder = Recorder::create(file, &setup)?;
     let ticks = (procedure.round_s * f64::from(TICK_HZ)).ceil() as u64;
@@ -52,6 +52,10 @@ fn record_with(
     let driver = Driver::new(profile.config.patient.clone());
     let device = VirtualDevice::new(profile, procedure);
     let device = if is_deformed { device.with_deformed(profile)? } else { device };
-    RunLoop::new(driver, outlets, &stop).run_in_step(device, RealtimeClock::Free, |_| {})?;
+    RunLoop::new(driver, outlets, &stop).following(profile).run_in_step(
+        device,
+        RealtimeClock::Free,
+        |_| {},
+    )?;
     Recording::read(file)
 }

@@ -3,7 +3,6 @@
 //! feature `class` is built: `cargo xtask nightly class`.
 
 use crate::common::{figure, folder, host_sim, refused, run, text};
-use control_core::Device;
 use server::class::board::{Board, MemberView, Sent};
 use server::class::{self, Listener, Meeting};
 use std::io::{BufRead, BufReader};
@@ -101,7 +100,10 @@ fn members_leave_and_return_and_recordings_lose_no_sample() {
     wait("both gone without an instructor", &board, |b| view(b).iter().all(|m| m.gone));
     let (board, _listener) = listen(&meeting);
     wait("both are back", &board, |b| is_here(b, "steady") && is_here(b, "restless"));
-    wait("a score", &board, |b| member(b, "steady").is_some_and(|m| m.score.insertions >= 1));
+    let has_been_in =
+        |m: MemberView| m.events.iter().any(|event| event["kind"] == "exit" && event["layer"] == 0);
+    wait("a scripted insertion", &board, |b| member(b, "steady").is_some_and(has_been_in));
+    assert_eq!(member(&board, "steady").map(|m| m.score.insertions), Some(0), "it is nobody's");
     restless.kill().expect("it runs");
     let _ = restless.wait();
 
@@ -156,8 +158,7 @@ fn a_stalled_instructor_and_a_mute_server_hold_up_nothing() {
     let mute = TcpListener::bind("127.0.0.1:0").expect("a port");
     let nowhere = Meeting { address: mute.local_addr().expect("bound"), ..meeting("mute", None) };
     let (session, publisher) = crate::common::paced::open();
-    let _membership =
-        class::join(session, Device::commissioned_virtual(), &nowhere, &"a".parse().expect("a name"));
+    let _membership = class::join(session, &nowhere, &"a".parse().expect("a name"));
     let run = crate::common::paced::run(publisher, crate::common::paced::End::After(3), true);
     check("a mute server", &run);
 
@@ -170,8 +171,7 @@ fn a_stalled_instructor_and_a_mute_server_hold_up_nothing() {
     let mut lines = BufReader::new(instructor.stdout.take().expect("piped")).lines();
     assert!(lines.any(|line| line.is_ok_and(|line| line.starts_with("class page at"))));
     let (session, publisher) = crate::common::paced::open();
-    let membership =
-        class::join(session, Device::commissioned_virtual(), &stalled, &"a".parse().expect("a name"));
+    let membership = class::join(session, &stalled, &"a".parse().expect("a name"));
     let pid = rustix::process::Pid::from_child(&instructor);
     let stop = std::thread::spawn(move || {
         std::thread::sleep(Duration::from_secs(2));

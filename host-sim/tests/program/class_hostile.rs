@@ -4,7 +4,6 @@
 //! class`.
 
 use crate::common::host_sim;
-use control_core::Device;
 use server::class::{self, Meeting};
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
@@ -151,9 +150,7 @@ fn neither_the_page_nor_a_device_notices_hostile_programs() {
     let meeting = Meeting { class: "besieged".parse().expect("a name"), address: free, token: None };
     let (mut child, page) = instructor(&meeting);
     let (session, publisher) = crate::common::paced::open();
-    let membership =
-        class::join(session, Device::commissioned_virtual(), &meeting, &"bed-1".parse().expect("a name"))
-            .expect("it joins");
+    let membership = class::join(session, &meeting, &"bed-1".parse().expect("a name")).expect("it joins");
 
     let silent: Vec<TcpStream> = (0..SILENT).filter_map(|_| TcpStream::connect(free).ok()).collect();
     assert_eq!(silent.len(), SILENT);

@@ -36,7 +36,7 @@ fn run(device: &Device, wanted: &str, seconds: u64, file: &Path) -> Subscription
         profile_origin: profile.source.origin.clone(),
         procedure: None,
         device_toml: None,
-        tasks: Vec::new(),
+        purpose: None,
     };
     let recorder = Recorder::create(file, &setup).expect("the folder can be written");
     let stop = AtomicBool::new(false);

@@ -24,7 +24,7 @@ fn setup() -> Setup {
         profile_origin: profile.source.origin,
         procedure: None,
         device_toml: None,
-        tasks: Vec::new(),
+        purpose: None,
     }
 }
 

@@ -2,10 +2,11 @@
 //! an insertion are kept until the needle has left the skin, and then scored as `host-sim score`
 //! scores them.
 
-use crate::score::{Insertion, Judge, Span, spans};
+use crate::score::{Insertion, Judge, Span};
+use crate::verdict::{self, Verdict};
 use control_core::TICK_HZ;
 use control_core::controller::Sample;
-use device_sim::procedure::task::Task;
+use device_sim::procedure::purpose::Purpose;
 use device_sim::profile::Profile;
 use device_sim::session::Batch;
 use link::frames::EventKind;
@@ -23,19 +24,16 @@ const MOST_TASKS: usize = 1_000;
 /// The insertion in progress.
 #[derive(Debug, Default)]
 pub struct LiveScore {
-    profile: Option<Profile>,
-    /// The tasks that the procedure asks for.
-    tasks: Vec<Task>,
+    judge: Option<Judge>,
     stretch: Option<Stretch>,
     /// Tick of the first sample ever: begins are counted from it, as in a recording.
     zero_tick: Option<u64>,
 }
 
 impl LiveScore {
-    /// Insertions from now on are into `profile`, with these tasks; one in progress is dropped.
-    pub fn patient(&mut self, profile: Profile, tasks: &[Task]) {
-        self.profile = Some(profile);
-        self.tasks = tasks.to_vec();
+    /// Insertions from now on are into `profile`, for this purpose; one in progress is dropped.
+    pub fn patient(&mut self, profile: &Profile, purpose: Option<Purpose>) {
+        self.judge = Some(Judge::new(profile, purpose, 0));
         if let Some(stretch) = &mut self.stretch {
             stretch.tasks.clear();
             let end = stretch.end_tick();
@@ -43,16 +41,9 @@ impl LiveScore {
         }
     }
 
-    /// Takes what has arrived; the insertions that have ended with it.
-    pub fn take(&mut self, batch: &Batch) -> Vec<Insertion> {
-        let mut ended = Vec::new();
-        self.take_each(batch, |_, insertion| ended.push(insertion));
-        ended
-    }
-
     /// Takes what has arrived and shows each insertion that has ended with it to `see`, with its
     /// figures.
-    pub(crate) fn take_each(&mut self, batch: &Batch, see: impl FnMut(Span<'_>, Insertion)) {
+    pub(crate) fn take_each(&mut self, batch: &Batch, see: impl FnMut(&Judge, Span<'_>, Insertion)) {
         if let Some(hello) = &batch.hello {
             let hello = Hello::from(hello);
             let (samples, events) = (Vec::new(), Vec::new());
@@ -62,7 +53,8 @@ impl LiveScore {
         }
         let Some(stretch) = &mut self.stretch else { return };
         for (tick, sample) in &batch.samples {
-            self.zero_tick.get_or_insert(*tick);
+            let zero_tick = *self.zero_tick.get_or_insert(*tick);
+            self.judge.iter_mut().for_each(|judge| judge.count_from(zero_tick));
             append(stretch, *tick, *sample);
         }
         let first = stretch.first_tick;
@@ -74,26 +66,39 @@ impl LiveScore {
     }
 
     /// Shows the insertions whose samples are all here; they are forgotten.
-    fn ended(&mut self, mut see: impl FnMut(Span<'_>, Insertion)) {
-        let (Some(stretch), Some(profile)) = (&mut self.stretch, &self.profile) else { return };
+    fn ended(&mut self, mut see: impl FnMut(&Judge, Span<'_>, Insertion)) {
+        let (Some(stretch), Some(judge)) = (&mut self.stretch, &self.judge) else { return };
         let end = stretch.end_tick();
-        let leaves = |event: &&link::frames::Event| {
-            matches!(event.kind, EventKind::Exit { layer: 0 }) && event.tick < end
-        };
-        let Some(left) = stretch.events.iter().rfind(leaves).map(|event| event.tick) else {
+        let mut left = None;
+        for (span, has_ended) in judge.spans(stretch) {
+            if has_ended && span.end < end {
+                see(judge, span, judge.insertion(span));
+                left = Some(span.end);
+            }
+        }
+        let Some(left) = left else {
             if !stretch.events.iter().any(|event| matches!(event.kind, EventKind::Contact { layer: 0 })) {
                 let first = end.saturating_sub(OUTSIDE as u64).max(stretch.first_tick);
                 begin_at(stretch, first);
             }
             return;
         };
-        let judge = Judge::new(profile, &self.tasks, self.zero_tick.unwrap_or_default());
-        for span in spans(stretch).into_iter().filter(|span| span.end <= left) {
-            see(span, judge.insertion(span));
-        }
         begin_at(stretch, left + 1);
         // Tasks that were done before this insertion ended do not count for the next one.
         stretch.tasks.retain(|task| task.tick > left);
+    }
+
+    /// Returns the goal with nothing done, before a device has said anything.
+    pub(crate) fn to_come(&self) -> Option<Verdict> {
+        self.judge.as_ref().map(|judge| verdict::open(judge.aim()))
+    }
+
+    /// Returns the verdict so far on the attempt that is going on, or is to come.
+    pub(crate) fn so_far(&self) -> Option<Verdict> {
+        let (stretch, judge) = (self.stretch.as_ref()?, self.judge.as_ref()?);
+        let now = stretch.end_tick();
+        let begun = judge.spans(stretch).pop().map(|(span, _)| span);
+        Some(judge.verdict(begun.unwrap_or(Span { stretch, begin: now, end: now })))
     }
 }
 

@@ -1,121 +1,29 @@
-//! Practice: each insertion of a run is judged as soon as the needle has left the skin, by the code
-//! that judges recordings, against what its patient is for. What was judged goes to the pages.
+//! Practice: each insertion of a run is judged as soon as it has ended, by the code that judges
+//! recordings. The steps of its goal go to the pages while it goes on, its verdict afterwards.
 
 use crate::live_score::LiveScore;
 use crate::score::Insertion;
 use crate::score::gesture::Gesture;
-use crate::score::target::TargetOutcome;
-use control_core::config::Tissue;
-use device_sim::procedure::task::Task;
+use crate::verdict::{StepState, Verdict};
+use device_sim::procedure::purpose::Purpose;
 use device_sim::profile::Profile;
 use device_sim::session::{Publisher, Subscription};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
+use serde_json::json;
 
-/// The tip has to rest in the vein for so long: blood is drawn, or a cannula put in.
-const IN_LUMEN_S: f64 = 0.5;
-/// An angle further off than this, root mean square along the way, is not the patient's any more,
-/// °.
-const ANGLE_WITHIN_DEG: f64 = 5.0;
 /// Places a second of the way that a page draws.
 const PATH_HZ: f64 = 25.0;
 
-/// The goal of an insertion into a patient.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Goal {
-    /// Into the vein and not through it.
-    Vein,
-    /// Into this structure, which the patient names as the target, and not through it.
-    Structure(Tissue),
-    /// Into the skin: the patient has nothing else.
-    Skin,
-}
-
-impl Goal {
-    /// Returns the goal of insertions into this patient.
-    pub(crate) fn of(profile: &Profile) -> Self {
-        let layers = &profile.config.patient.layers;
-        if layers.iter().any(|layer| layer.tissue == Tissue::Vessel) {
-            return Goal::Vein;
-        }
-        let target = profile.goal().and_then(|goal| layers.get(usize::from(goal.layer)));
-        target.map_or(Goal::Skin, |layer| Goal::Structure(layer.tissue))
-    }
-
-    /// Returns the goal as a sentence without its full stop.
-    pub(crate) fn in_words(self) -> String {
-        match self {
-            Goal::Vein => format!("Enter the vein, rest in it for {IN_LUMEN_S} s, and do not go through it"),
-            Goal::Structure(tissue) => {
-                format!(
-                    "Reach the {} and touch nothing that is to be spared",
-                    device_sim::session::tissue_name(tissue)
-                )
-            }
-            Goal::Skin => "Pierce the skin".into(),
-        }
-    }
-
-    /// Returns the numeric limits of an attempt that reaches the goal, by the names of the figures.
-    fn targets(self) -> serde_json::Value {
-        let mut targets = serde_json::json!({
-            "angle_rms_error_deg": { "at_most": ANGLE_WITHIN_DEG },
-            "spared_hits": { "at_most": 0 },
-        });
-        if self == Goal::Vein {
-            targets["in_lumen_s"] = serde_json::json!({ "at_least": IN_LUMEN_S });
-        }
-        targets
-    }
-
-    /// Returns what an insertion lacks, in words; nothing where it has reached the goal.
-    pub(crate) fn missing(self, figures: &Insertion) -> Vec<String> {
-        let mut missing = Vec::new();
-        match self {
-            Goal::Vein if figures.through_far_wall => missing.push("it went through the far wall".into()),
-            Goal::Vein if !figures.vessel => missing.push("the vein was not entered".into()),
-            Goal::Vein if figures.in_lumen_s < IN_LUMEN_S => {
-                missing.push(format!("it rested in the vein for {:.1} s only", figures.in_lumen_s));
-            }
-            Goal::Structure(tissue) => {
-                let tissue = device_sim::session::tissue_name(tissue);
-                match figures.target.as_ref().map(|target| target.outcome) {
-                    Some(TargetOutcome::Reached) => {}
-                    Some(TargetOutcome::Beyond) => missing.push(format!("it went through the {tissue}")),
-                    Some(TargetOutcome::Missed) | None => {
-                        missing.push(format!("the {tissue} was not reached"))
-                    }
-                }
-            }
-            Goal::Skin if figures.punctures == 0 => missing.push("the skin was not pierced".into()),
-            _ => {}
-        }
-        let mistakes = figures.tasks.iter().flat_map(|tasks| &tasks.list).filter(|task| task.is_critical);
-        missing.extend(mistakes.map(|task| task.in_words()));
-        if figures.spared_hits > 0 {
-            missing.push("something that is to be spared was touched".into());
-        }
-        if figures.angle_rms_error_deg.is_some_and(|error| error > ANGLE_WITHIN_DEG) {
-            missing.push(format!("the angle was off by more than {ANGLE_WITHIN_DEG}°"));
-        }
-        missing
-    }
-}
-
 /// An insertion with its verdict.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Attempt {
     /// Its number in this run, from 1.
     pub number: u32,
     /// Name of the patient.
     pub patient: String,
-    /// True if a person held the needle when it ended; otherwise the scripted hand did, or nobody
-    /// knows.
+    /// True if a person held the needle all the while; otherwise the scripted hand did.
     pub by_person: bool,
-    /// True if it has reached the goal.
-    pub reached: bool,
-    /// The criteria that it does not meet, each in words.
-    pub missing: Vec<String>,
-    /// The figures of `score`.
+    /// The figures of `score`, with the verdict.
     pub figures: Insertion,
     /// Time since the first touch in s, and depth along the needle in mm.
     pub path: Vec<(f64, f64)>,
@@ -126,71 +34,86 @@ pub struct Practice {
     subscription: Subscription,
     live: LiveScore,
     patient: String,
-    goal: Goal,
-    skin_tilt_rad: f64,
+    purpose: Option<Purpose>,
     count: u32,
     by_person: bool,
+    /// The scripted hand has moved the needle since the last insertion ended.
+    was_scripted: bool,
+    /// The verdict so far that was published last.
+    so_far: Option<Verdict>,
 }
 
 impl Practice {
-    /// Listens to a session from now on.
-    pub fn new(subscription: Subscription, profile: &Profile, tasks: &[Task], publisher: &Publisher) -> Self {
+    /// Listens to a session from now on. `by_person` says who holds the needle until
+    /// [`Self::held`] says it.
+    pub fn new(
+        subscription: Subscription,
+        profile: &Profile,
+        purpose: Option<Purpose>,
+        by_person: bool,
+    ) -> Self {
         let mut practice = Self {
             subscription,
             live: LiveScore::default(),
             patient: String::new(),
-            goal: Goal::Skin,
-            skin_tilt_rad: 0.0,
+            purpose: None,
             count: 0,
-            by_person: false,
+            by_person,
+            was_scripted: !by_person,
+            so_far: None,
         };
-        practice.patient(profile, tasks, publisher);
+        practice.patient(profile, purpose);
         practice
     }
 
-    /// Insertions are into `profile`, with these tasks, from now on; one in progress is not judged.
-    pub fn patient(&mut self, profile: &Profile, tasks: &[Task], publisher: &Publisher) {
-        self.live.patient(profile.clone(), tasks);
-        self.patient = profile.name.clone();
-        self.goal = Goal::of(profile);
-        self.skin_tilt_rad = profile.skin_tilt_rad();
-        publisher.practice(&serde_json::json!({
-            "goal": self.goal.in_words(),
-            "patient": self.patient,
-            "targets": self.goal.targets(),
-            "tasks": tasks,
-        }));
+    /// Insertions are into `profile`, for this purpose, from now on; one in progress is not judged.
+    pub fn patient(&mut self, profile: &Profile, purpose: Option<Purpose>) {
+        self.live.patient(profile, purpose);
+        self.patient.clone_from(&profile.name);
+        self.purpose = purpose;
+        self.so_far = None;
     }
 
     /// Notes who holds the needle.
     pub fn held(&mut self, by_person: bool) {
         self.by_person = by_person;
+        self.was_scripted |= !by_person;
     }
 
-    /// Judges what has ended since the last time.
+    /// Judges what has ended since the last time, and says how the present attempt goes.
     pub fn judge(&mut self, publisher: &Publisher) {
         let batch = self.subscription.drain();
         let mut ended = Vec::new();
-        let (goal, skin_tilt_rad) = (self.goal, self.skin_tilt_rad);
-        self.live.take_each(&batch, |span, figures| {
-            let missing = goal.missing(&figures);
-            ended.push((missing, path(&span.gesture(skin_tilt_rad)), figures));
-        });
-        for (missing, path, figures) in ended {
+        self.live.take_each(&batch, |judge, span, figures| ended.push((path(&judge.gesture(span)), figures)));
+        for (path, figures) in ended {
             self.count += 1;
             let attempt = Attempt {
                 number: self.count,
                 patient: self.patient.clone(),
-                by_person: self.by_person,
-                reached: missing.is_empty(),
-                missing,
+                by_person: self.by_person && !self.was_scripted,
                 figures,
                 path,
             };
+            self.was_scripted = !self.by_person;
             // Numbers and texts can always be written.
             if let Ok(json) = serde_json::to_value(&attempt) {
                 publisher.attempt(&json);
             }
+        }
+        let so_far = self.live.so_far().or_else(|| self.live.to_come());
+        if so_far.is_some() && so_far != self.so_far {
+            if let Some(verdict) = &so_far {
+                let next = verdict.steps.iter().position(|step| step.state == StepState::Open);
+                publisher.practice(&json!({
+                    "goal": verdict.goal,
+                    "patient": self.patient,
+                    "purpose": self.purpose,
+                    "steps": verdict.steps,
+                    "reasons": verdict.reasons,
+                    "next": next,
+                }));
+            }
+            self.so_far = so_far;
         }
     }
 }
@@ -204,17 +127,4 @@ fn path(gesture: &Gesture) -> Vec<(f64, f64)> {
             (rounded(index as f64 / crate::score::gesture::RATE_HZ), rounded(place.depth_mm))
         })
         .collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_goal_follows_from_the_patient() {
-        let goal = |name: &str| Goal::of(&Profile::find(name).expect("it is built in"));
-        assert_eq!(goal("adult"), Goal::Vein);
-        assert_eq!(goal("dorsal-hand"), Goal::Vein);
-        assert!(matches!(goal("shoulder"), Goal::Structure(Tissue::Bursa)), "{:?}", goal("shoulder"));
-    }
 }

@@ -1,7 +1,6 @@
 //! Insertions as statements of the Experience API 1.0.3 (xAPI), which a learning record store takes
 //! as a JSON array. A statement has no `id`: the store adds one.
 
-use crate::practice::Goal;
 use crate::score::{Insertion, each};
 use control_core::TICK_HZ;
 use device_sim::error::Error;
@@ -18,7 +17,7 @@ const SIMULATION: &str = "http://adlnet.gov/expapi/activities/simulation";
 const OURS: &str = "urn:needle-insertion:";
 
 /// Returns a statement for each insertion: passed or failed, how long it took, the figures of
-/// `score`, and what was missing. `e_mail` is the trainee's.
+/// `score`, and the verdict. `e_mail` is the trainee's.
 pub fn statements(recording: &Recording, by: Option<&Profile>, e_mail: &str) -> Result<Vec<Value>, Error> {
     let actor = actor(e_mail)?;
     let mut statements = Vec::new();
@@ -56,9 +55,8 @@ fn actor(e_mail: &str) -> Result<Value, Error> {
 }
 
 fn statement(actor: &Value, profile: &Profile, figures: &Insertion) -> Value {
-    let goal = Goal::of(profile);
-    let missing = goal.missing(figures);
-    let verb = if missing.is_empty() { "passed" } else { "failed" };
+    let verdict = &figures.verdict;
+    let verb = if verdict.passed { "passed" } else { "failed" };
     json!({
         "version": VERSION,
         "actor": actor,
@@ -69,27 +67,24 @@ fn statement(actor: &Value, profile: &Profile, figures: &Insertion) -> Value {
             "definition": {
                 "type": SIMULATION,
                 "name": { "en": format!("Needle insertion, patient {}", profile.name) },
-                "description": { "en": format!("{}.", goal.in_words()) },
+                "description": { "en": format!("{}.", verdict.goal) },
             },
         },
         "result": {
-            "success": missing.is_empty(),
+            "success": verdict.passed,
             "completion": true,
             "duration": format!("PT{:.2}S", figures.time_s),
-            "extensions": extensions(figures, &missing),
+            "extensions": extensions(figures),
         },
         "context": { "platform": recording::version::program() },
     })
 }
 
-/// The figures that are known, by the names of `score --json`, and what was missing in words.
-fn extensions(figures: &Insertion, missing: &[String]) -> Map<String, Value> {
+/// The figures that are known, by the names of `score --json`, the verdict among them.
+fn extensions(figures: &Insertion) -> Map<String, Value> {
     let figures = serde_json::to_value(figures).unwrap_or_default();
     let known = figures.as_object().into_iter().flatten().filter(|(_, value)| !value.is_null());
-    let mut extensions: Map<String, Value> =
-        known.map(|(name, value)| (format!("{OURS}figure:{name}"), value.clone())).collect();
-    extensions.insert(format!("{OURS}missing"), json!(missing));
-    extensions
+    known.map(|(name, value)| (format!("{OURS}figure:{name}"), value.clone())).collect()
 }
 
 /// A name as a part of a URN: other characters than letters, digits, `-`, `.` and `_` are
@@ -105,25 +100,23 @@ fn in_urn(name: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::verdict::Verdict;
 
     #[test]
     fn a_statement_says_what_the_figures_say() {
         let adult = Profile::find("adult").expect("it is built in");
         let actor = actor("trainee@example.org").expect("an address");
-        let good =
-            Insertion { time_s: 3.604, vessel: true, in_lumen_s: 1.0, punctures: 2, ..Insertion::default() };
+        let verdict = Verdict { goal: "Reach the vein".into(), passed: true, ..Verdict::default() };
+        let good = Insertion { time_s: 3.604, punctures: 2, verdict, ..Insertion::default() };
         let passed = statement(&actor, &adult, &good);
         assert_eq!(passed["verb"]["id"], "http://adlnet.gov/expapi/verbs/passed");
         assert_eq!(passed["object"]["id"], "urn:needle-insertion:patient:adult");
+        assert_eq!(passed["object"]["definition"]["description"]["en"], "Reach the vein.");
         assert_eq!(passed["result"]["duration"], "PT3.60S");
         assert_eq!(passed["result"]["success"], true);
-        let bad = Insertion { through_far_wall: true, ..good };
-        let failed = statement(&actor, &adult, &bad);
+        let failed = statement(&actor, &adult, &Insertion::default());
         assert_eq!(failed["verb"]["id"], "http://adlnet.gov/expapi/verbs/failed");
-        assert_eq!(
-            failed["result"]["extensions"]["urn:needle-insertion:missing"],
-            json!(["it went through the far wall"])
-        );
+        assert_eq!(failed["result"]["success"], false);
     }
 
     #[test]

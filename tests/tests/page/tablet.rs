@@ -18,8 +18,8 @@ const FINGER_PX: f64 = 44.0;
 const KEEP_SOCKET: &str =
     "WebSocket = class extends WebSocket { constructor(...all) { super(...all); window.socket = this; } };";
 const FIFTY_ATTEMPTS: &str = "for (let number = 1; number <= 50; number++) socket.onmessage({ data: JSON.stringify({
-    type: 'attempt', number, patient: 'adult', by_person: true, reached: number % 3 === 0, missing: [], path: [],
-    figures: { time_s: 5.1, peak_force_n: 1.2, in_lumen_s: 0.6, angle_rms_error_deg: 2, spared_hits: 0 } }) })";
+    type: 'attempt', number, patient: 'adult', by_person: true, path: [],
+    figures: { time_s: 5.1, peak_force_n: 1.2, in_lumen_s: 0.6, verdict: { passed: number % 3 === 0, reasons: [] } } }) })";
 
 #[test]
 fn nothing_covers_what_a_finger_is_to_touch() {

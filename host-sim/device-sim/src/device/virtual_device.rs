@@ -61,7 +61,7 @@ pub struct VirtualDevice {
     /// The step of the procedure that is going on, as soon as it has begun.
     step: Option<usize>,
     /// Tasks that the scripted hand has done and that have not been reported yet.
-    done: Vec<String>,
+    done: Vec<&'static str>,
     set_value: f64,
     enable: bool,
     tripped: Option<Fault>,
@@ -322,12 +322,12 @@ impl VirtualDevice {
     fn begin_step(&mut self, into: f64) {
         let step = self.procedure.step_at(into);
         if self.step.replace(step) != Some(step) {
-            self.done.extend(self.procedure.task_of(step).map(str::to_owned));
+            self.done.extend(self.procedure.task_of(step));
         }
     }
 
     /// Returns the tasks that the scripted hand has done since the last time.
-    pub fn take_done(&mut self) -> Vec<String> {
+    pub fn take_done(&mut self) -> Vec<&'static str> {
         std::mem::take(&mut self.done)
     }
 

@@ -55,6 +55,7 @@ impl Condenser {
             link: batch.link,
             hand: Hand::default(),
             timing: batch.timing.map(timing),
+            needle: batch.needle,
         };
         (device, frame)
     }

@@ -72,6 +72,9 @@ pub struct Frame {
     pub hand: Hand,
     /// Times of the device's stages, once a second.
     pub timing: Option<Timing>,
+    /// The place at which the needle's line has depth 0, where it has moved: mm along the skin from
+    /// the point of entry, and below it.
+    pub needle: Option<[f64; 2]>,
 }
 
 /// The needle's pose and force.

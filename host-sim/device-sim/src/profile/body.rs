@@ -121,7 +121,8 @@ fn tissue_name(tissue: Tissue) -> TissueName {
         Tissue::Vessel => TissueName::Vessel,
         Tissue::Artery => TissueName::Other,
         Tissue::Bursa => TissueName::Bursa,
-        Tissue::Tendon => TissueName::Tendon,
+        // A nerve resists no more than the tendon beside it.
+        Tissue::Tendon | Tissue::Nerve => TissueName::Tendon,
         Tissue::Cartilage => TissueName::Cartilage,
     }
 }
@@ -142,15 +143,23 @@ impl InBody {
             ));
         }
         let sine = libm::sin(self.place.incline_deg.to_radians());
-        let (mut layers, mut names, mut last) = (Vec::<Layer>::new(), Vec::<String>::new(), None);
-        let mut put = |kind: &Layer, name: &str, from_mm: f64| {
-            if layers.len() < MAX_LAYERS {
-                layers.push(Layer { depth_mm: Some(from_mm * sine), thickness: None, ..kind.clone() });
-                names.push(name.to_owned());
-            }
-        };
-        let (mut vessel, mut under_wall) = (false, None);
-        for piece in &self.pieces {
+        let has_far_wall = of(TissueName::FarWall).is_some();
+        let mut met = self.met_along(&self.pieces, has_far_wall);
+        met.truncate(MAX_LAYERS);
+        let layers = met.iter().filter_map(|(tissue, _, from_mm)| {
+            let kind = of(*tissue)?.clone();
+            Some(Layer { depth_mm: Some(from_mm * sine), thickness: None, ..kind })
+        });
+        let layers = layers.collect();
+        let names = met.into_iter().map(|(_, name, _)| name.to_owned()).collect();
+        self.names = names;
+        Ok(layers)
+    }
+
+    /// Returns tissue, name and beginning in mm of the layers that `pieces` of a line are.
+    fn met_along(&self, pieces: &[Piece], has_far_wall: bool) -> Vec<(TissueName, &'static str, f64)> {
+        let (mut met, mut last, mut vessel, mut under_wall) = (Vec::new(), None, false, None);
+        for piece in pieces {
             let structure = &self.body.structures[piece.structure];
             let tissue = tissue_name(structure.tissue);
             if tissue == TissueName::Skin && last.is_some() {
@@ -166,18 +175,34 @@ impl InBody {
             if again {
                 continue;
             }
-            let Some(kind) = of(tissue) else { continue };
-            put(kind, structure.name, piece.from_mm);
+            met.push((tissue, structure.name, piece.from_mm));
             if tissue == TissueName::Vessel {
                 vessel = true;
-                if let Some(far) = of(TissueName::FarWall) {
-                    put(far, "far wall", piece.to_mm);
+                if has_far_wall {
+                    met.push((TissueName::FarWall, "far wall", piece.to_mm));
                     under_wall = Some(piece.to_mm);
                 }
             }
         }
-        self.names = names;
-        Ok(layers)
+        met
+    }
+
+    /// Returns where the line of a needle that has turned meets each layer of the device, mm along
+    /// it; none for a layer that it does not meet. The line begins at `origin_mm` in the needle's
+    /// plane, along it and below the point of entry, and is inclined by `incline_rad`.
+    pub(crate) fn tops_mm(&self, origin_mm: [f64; 2], incline_rad: f64) -> Vec<Option<f64>> {
+        let block = &self.line.block;
+        let origin = block.to_limb([origin_mm[0], 0.0, origin_mm[1]]);
+        let direction = block.direction_to_limb([libm::cos(incline_rad), 0.0, libm::sin(incline_rad)]);
+        let pieces = self.body.met(origin, direction, REACH_MM);
+        let met = self.met_along(&pieces, true);
+        let mut from = 0;
+        let top = |name: &String| {
+            let found = from + met[from..].iter().position(|(_, own, _)| own == name)?;
+            from = found + 1;
+            Some(met[found].2)
+        };
+        self.names.iter().map(top).collect()
     }
 
     /// Returns the body for a picture.
@@ -288,7 +313,7 @@ mod tests {
 
     #[test]
     fn a_vein_that_is_missed_leaves_fat_and_muscle() {
-        let beside = Entry { around_deg: Some(15.0), ..Entry::default() };
+        let beside = Entry { around_deg: Some(25.0), ..Entry::default() };
         let beside = find("forearm").entered(&beside).expect("it goes in");
         let names: Vec<_> = layers(&beside).into_iter().map(|(name, _)| name).collect();
         assert_eq!(names, ["skin", "fat", "muscle"]);

@@ -43,6 +43,11 @@ pub(super) struct Written {
 }
 
 impl Written {
+    /// Returns the tissue that is to be reached.
+    pub(super) fn tissue(self) -> Tissue {
+        self.tissue.into()
+    }
+
     /// Checks that it is one of the layers and ends below its beginning.
     pub(super) fn check(self, layers: &[Layer]) -> Result<(), String> {
         if !layers.iter().any(|layer| layer.tissue == self.tissue) {

@@ -70,6 +70,8 @@ pub struct Profile {
     pub body: Option<InBody>,
     /// The needle's target.
     goal: Option<goal::Written>,
+    /// True if the patient has a vein that is not to be spared, on the needle's line or off it.
+    has_vein: bool,
     /// The text that it came from, for recordings.
     pub source: Text,
 }
@@ -102,6 +104,8 @@ impl Profile {
         file.beside.iter().try_for_each(Beside::check).map_err(refuse)?;
         condition::apply(&mut file.layer, &file.patient, file.force_table.is_some()).map_err(refuse)?;
         file.target.map_or(Ok(()), |goal| goal.check(&file.layer)).map_err(refuse)?;
+        let is_vein = |layer: &Layer| layer.tissue == TissueName::Vessel && !layer.is_spared();
+        let has_vein = file.layer.iter().any(is_vein);
         let body = file.take_body().map_err(refuse)?;
         let config = Config { device: *device, patient: file.config().map_err(refuse)? };
         let plan = config.plan().map_err(|refusal| refuse(refusal::say(&refusal, &file)))?;
@@ -110,6 +114,7 @@ impl Profile {
         Ok(Self {
             spared: spared.collect(),
             goal: file.target,
+            has_vein,
             beside: file.beside,
             body,
             procedure: file.procedure.unwrap_or_else(|| "venepuncture".into()),
@@ -194,6 +199,12 @@ impl Profile {
     /// Returns the needle's target: that of the file, else the vessel's lumen if there is a vessel.
     pub fn goal(&self) -> Option<Goal> {
         goal::goal(self.goal, &self.config.patient, self.entry_rad, self.body.is_some())
+    }
+
+    /// Returns the tissue that the needle is to come into: that of the file, else a vein that is
+    /// not to be spared. It does not depend on the needle's line.
+    pub fn aim(&self) -> Option<Tissue> {
+        self.goal.map(goal::Written::tissue).or(self.has_vein.then_some(Tissue::Vessel))
     }
 
     /// Inclination of the needle laid on the skin, in rad.

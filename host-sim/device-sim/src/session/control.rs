@@ -3,7 +3,7 @@
 
 use super::messages::ProbeView;
 use crate::named_files::is_file_name;
-use crate::procedure::task::is_name as is_task_name;
+use crate::procedure::purpose::is_task_name;
 use serde::{Deserialize, Serialize};
 
 /// A request of a person; `do` names the variant in the JSON that a page sends, e.g.

@@ -1,7 +1,7 @@
 //! The messages to those who watch a running device. Data only: nothing here waits or sends.
 
 use super::Scene;
-use crate::procedure::task::Task;
+use crate::procedure::purpose::Purpose;
 use control_core::controller::Sample;
 use link::frames::{Event, Hello, Pose, Timing};
 use serde::{Deserialize, Serialize};
@@ -38,8 +38,8 @@ pub struct PatientStatus {
     pub can_save: bool,
     /// The profile that counts, key by key as in its file.
     pub profile: serde_json::Value,
-    /// The tasks that the procedure asks for.
-    pub tasks: Vec<Task>,
+    /// The procedure's purpose.
+    pub purpose: Option<Purpose>,
     /// The answer to the last request.
     pub answer: Option<PatientAnswer>,
 }
@@ -131,6 +131,9 @@ pub struct Batch {
     pub events: Vec<Happening>,
     /// Tasks that were done (a subscriber's first batch repeats the last 256).
     pub tasks: Vec<TaskDone>,
+    /// The place at which the needle's line has depth 0, where it has moved: mm along the skin from
+    /// the point of entry, and below it.
+    pub needle: Option<[f64; 2]>,
     /// The place of the ultrasound probe, where it has moved.
     pub probe: Option<ProbeView>,
     /// The latest times of the stages, where there were any.

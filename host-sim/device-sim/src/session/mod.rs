@@ -61,6 +61,7 @@ struct HubState {
     subscribers: Vec<Weak<Mutex<Buffer>>>,
     hello: Option<Hello>,
     probe: Option<ProbeView>,
+    needle: Option<[f64; 2]>,
     timing: Option<Timing>,
     last_pose: Option<Pose>,
     events: VecDeque<Happening>,
@@ -84,6 +85,7 @@ struct Buffer {
     events: VecDeque<Happening>,
     tasks: VecDeque<TaskDone>,
     probe: Option<ProbeView>,
+    needle: Option<[f64; 2]>,
     timing: Option<Timing>,
     skipped_samples: u64,
     jumps: u64,
@@ -128,6 +130,7 @@ impl Session {
             attempts: state.attempts.clone(),
             hello: state.hello.clone(),
             probe: state.probe,
+            needle: state.needle,
             timing: state.timing,
             events: state.events.clone(),
             tasks: state.tasks.clone(),
@@ -174,6 +177,7 @@ impl Subscription {
             events: taken.events.into(),
             tasks: taken.tasks.into(),
             probe: taken.probe,
+            needle: taken.needle,
             timing: taken.timing,
             link,
         }
@@ -307,6 +311,13 @@ impl Publisher {
     pub fn probe(&self, view: ProbeView) {
         lock(&self.hub.state).probe = Some(view);
         self.each(|buffer| buffer.probe = Some(view));
+    }
+
+    /// The place at which the needle's line has depth 0, mm along the skin and below it.
+    pub fn needle(&self, origin_mm: [f64; 2]) {
+        if lock(&self.hub.state).needle.replace(origin_mm) != Some(origin_mm) {
+            self.each(|buffer| buffer.needle = Some(origin_mm));
+        }
     }
 
     /// Times of the stages.

@@ -29,7 +29,7 @@ pub(crate) fn code(tissue: Tissue) -> u32 {
         Tissue::Muscle => 2,
         Tissue::Artery => 9,
         Tissue::Bursa => 4,
-        Tissue::Tendon => 5,
+        Tissue::Tendon | Tissue::Nerve => 5,
         Tissue::Cartilage => 6,
         Tissue::Vessel => 7,
     }

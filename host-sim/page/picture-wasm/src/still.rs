@@ -28,7 +28,7 @@ fn medium(tissue: Tissue) -> Medium {
         Tissue::Muscle => "muscle",
         Tissue::Artery | Tissue::Vessel => "blood",
         Tissue::Bursa => "bursa",
-        Tissue::Tendon => "tendon",
+        Tissue::Tendon | Tissue::Nerve => "tendon",
         Tissue::Cartilage => "cartilage",
     })
 }

@@ -5,6 +5,7 @@ use device_sim::device::virtual_device::VirtualDevice;
 use device_sim::driver::Driver;
 use device_sim::error::Error;
 use device_sim::lockstep;
+use device_sim::needle::LineSender;
 use device_sim::page::condense::Condenser;
 use device_sim::page::messages::ToPage;
 use device_sim::procedure::Procedure;
@@ -19,6 +20,7 @@ const PROCEDURE: &str = "venepuncture";
 pub struct Simulation {
     device: VirtualDevice,
     driver: Driver,
+    needle: LineSender,
     session: Session,
     publisher: Publisher,
     subscription: Subscription,
@@ -41,6 +43,7 @@ impl Simulation {
         Ok(Self {
             device: VirtualDevice::new(&profile, procedure),
             driver,
+            needle: LineSender::new(&profile),
             subscription: session.subscribe(),
             session,
             publisher,
@@ -68,14 +71,23 @@ impl Simulation {
             for _ in 0..lockstep::TICKS {
                 self.device.tick();
             }
-            let Self { device, driver, publisher, digest, .. } = self;
+            let Self { device, driver, publisher, digest, needle, .. } = self;
             lockstep::empty(
                 |frame| device.transmit(frame),
                 |bytes| {
                     digest.take(bytes);
-                    driver.receive(now, bytes, |frame| publisher.frame(frame));
+                    driver.receive(now, bytes, |frame| {
+                        publisher.frame(frame);
+                        needle.frame(frame);
+                    });
                 },
             );
+            publisher.needle(needle.track().origin_mm());
+            if driver.is_ready(now)
+                && let Some(line) = needle.due(now)
+            {
+                driver.line(line);
+            }
         }
         self.status();
     }

@@ -17,6 +17,8 @@ pub enum Tissue {
     Vessel,
     /// An artery beside it.
     Artery,
+    /// A nerve.
+    Nerve,
     /// The bursa of a joint.
     Bursa,
     /// Tendon.

@@ -131,6 +131,7 @@ fn forearm(fat: f64) -> Vec<Structure> {
         layer("fat", Tissue::Fat, cylinder(fat)),
         layer("muscle", Tissue::Muscle, cylinder(0.0)),
         tubes("artery", Tissue::Artery, vec![(curve(under(16.0), reach, |x| -8.0 + 0.05 * x), 2.0)]),
+        tubes("nerve", Tissue::Nerve, vec![(curve(under(5.5), reach, |_| 14.0), 1.0)]),
         tubes("vein", Tissue::Vessel, vec![(vein, 1.5), (branch, 1.2)]),
     ]
 }

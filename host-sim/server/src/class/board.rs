@@ -20,7 +20,7 @@ const MOST_EVENTS: usize = 8;
 const SILENCE: Duration = Duration::from_secs(2);
 /// A tip that does not move in the body for longer than this is stuck, s.
 const STUCK_S: f64 = 20.0;
-/// So many insertions in a row without reaching the vessel, or through its far wall, are stuck.
+/// So many insertions in a row that did not pass are stuck.
 const STUCK_INSERTIONS: u32 = 3;
 
 /// Everything known of a class; shared between the network's threads and the page's.
@@ -238,7 +238,7 @@ impl About {
             return Some(format!("the needle has stood still in the body for {:.0} s", self.still_s));
         }
         let without = self.score.without_success;
-        (without >= STUCK_INSERTIONS).then(|| format!("{without} insertions in a row missed the lumen"))
+        (without >= STUCK_INSERTIONS).then(|| format!("{without} insertions in a row did not pass"))
     }
 }
 
@@ -285,7 +285,7 @@ mod tests {
         );
         let missed = ClassScore { insertions: 3, without_success: 3, ..ClassScore::default() };
         assert!(tells(&missed, 0.0, None).unwrap().contains("3 insertions"));
-        let found = ClassScore { insertions: 4, vessel: 1, ..ClassScore::default() };
+        let found = ClassScore { insertions: 4, passed: 1, ..ClassScore::default() };
         assert!(board.hear("a", "score", &serde_json::to_vec(&found).unwrap(), now), "at once");
         assert_eq!(view(&board, now).stuck, None);
     }

@@ -36,7 +36,7 @@ impl Kind {
         match self {
             Self::Pose => 64 * 1024,
             Self::Event => 1024,
-            Self::Score => 4 * 1024,
+            Self::Score => 16 * 1024,
             Self::About => 32 * 1024,
         }
     }
@@ -63,13 +63,11 @@ pub type PoseRow = [f64; 4];
 /// A trainee's insertions so far.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ClassScore {
-    /// Insertions that have ended.
+    /// A person's insertions that have ended.
     pub insertions: u32,
-    /// Those of them that reached the vessel.
-    pub vessel: u32,
-    /// Those of them that went through the vessel's far wall.
-    pub through_far_wall: u32,
-    /// Insertions since the last one that reached the vessel and spared the far wall.
+    /// Those of them that passed.
+    pub passed: u32,
+    /// Insertions since the last one that passed.
     pub without_success: u32,
     /// The last one; none before the first.
     pub last: Option<Insertion>,
@@ -79,10 +77,9 @@ impl ClassScore {
     /// One more has ended.
     pub fn count(&mut self, insertion: Insertion) {
         self.insertions += 1;
-        self.vessel += u32::from(insertion.vessel);
-        self.through_far_wall += u32::from(insertion.through_far_wall);
-        let good = insertion.vessel && !insertion.through_far_wall;
-        self.without_success = if good { 0 } else { self.without_success + 1 };
+        let passed = insertion.verdict.passed;
+        self.passed += u32::from(passed);
+        self.without_success = if passed { 0 } else { self.without_success + 1 };
         self.last = Some(insertion);
     }
 }

@@ -112,7 +112,6 @@ impl std::error::Error for ClassError {}
 mod without {
     use super::board::Board;
     use super::{ClassError, Meeting, Name};
-    use control_core::Device;
     use device_sim::session::Session;
     use std::convert::Infallible;
     use std::sync::Arc;
@@ -131,7 +130,7 @@ mod without {
     }
 
     /// Says which build can publish.
-    pub fn join(_: Session, _: Device, _: &Meeting, _: &Name) -> Result<Membership, ClassError> {
+    pub fn join(_: Session, _: &Meeting, _: &Name) -> Result<Membership, ClassError> {
         Err(not_built())
     }
 

@@ -7,7 +7,6 @@ use super::board::Board;
 use super::message::Kind;
 use super::publisher::ClassPublisher;
 use super::{ClassError, Meeting, Name};
-use control_core::Device;
 use device_sim::session::Session as NeedleSession;
 use std::io::Write;
 use std::path::PathBuf;
@@ -68,12 +67,7 @@ impl Drop for Listener {
 
 /// Publishes what `session` does as `name`, from a thread of its own. The instructor may come and
 /// go.
-pub fn join(
-    session: NeedleSession,
-    device: Device,
-    meeting: &Meeting,
-    name: &Name,
-) -> Result<Membership, ClassError> {
+pub fn join(session: NeedleSession, meeting: &Meeting, name: &Name) -> Result<Membership, ClassError> {
     let failed = |cause| failed(meeting, "joined", cause);
     let zenoh = open(meeting, Side::Device).map_err(failed)?;
     let publishers = Publishers::declare(&zenoh, meeting, name).map_err(failed)?;
@@ -82,7 +76,7 @@ pub fn join(
     let stopped = stop.clone();
     let run = move || {
         let _alive: mpsc::Sender<()> = alive;
-        publish(&session, device, &publishers, &stopped);
+        publish(&session, &publishers, &stopped);
         drop(publishers);
         let _ = zenoh.close().wait();
     };
@@ -141,9 +135,9 @@ impl Publishers {
     }
 }
 
-fn publish(session: &NeedleSession, device: Device, publishers: &Publishers, stop: &AtomicBool) {
+fn publish(session: &NeedleSession, publishers: &Publishers, stop: &AtomicBool) {
     let mut subscription = session.subscribe();
-    let mut publisher = ClassPublisher::new(device);
+    let mut publisher = ClassPublisher::default();
     let begin = Instant::now();
     while !stop.load(Ordering::Relaxed) {
         for (kind, bytes) in publisher.take(subscription.drain(), begin.elapsed()) {

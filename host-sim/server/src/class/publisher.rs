@@ -1,17 +1,14 @@
 //! The messages of one device to its class, from its session's batches. Pure: no clock, no network.
 
 use super::message::{About, ClassScore, Kind, Poses};
-use control_core::Device;
-use device_sim::named_files::Text;
 use device_sim::page::condense::Condenser;
 use device_sim::page::messages::{self, Event};
-use device_sim::profile::Profile;
-use device_sim::session::{Batch, PatientStatus, Scene};
+use device_sim::session::{Batch, Scene};
 use link::frames::EventKind;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 use std::time::Duration;
-use training::live_score::LiveScore;
+use training::practice::Attempt;
 
 /// Between two [`About`]s.
 const ABOUT_PERIOD: Duration = Duration::from_secs(1);
@@ -26,9 +23,7 @@ pub type Message = (Kind, Vec<u8>);
 /// Remembers between batches what the next messages need.
 #[derive(Debug, Default)]
 pub struct ClassPublisher {
-    device: Device,
     condenser: Condenser,
-    scoring: LiveScore,
     score: ClassScore,
     scene: Option<Scene>,
     fault: Option<String>,
@@ -39,11 +34,6 @@ pub struct ClassPublisher {
 }
 
 impl ClassPublisher {
-    /// For a device that is built like `device`, which says whether a patient fits.
-    pub fn new(device: Device) -> Self {
-        Self { device, ..Self::default() }
-    }
-
     /// The messages for what has arrived since the last call; every pose of it is in them. `now` is
     /// any clock that goes on.
     pub fn take(&mut self, batch: Batch, now: Duration) -> Vec<Message> {
@@ -51,13 +41,10 @@ impl ClassPublisher {
         if let Some(scene) = batch.scene.clone() {
             (self.scene, self.told) = (Some(scene), None);
         }
-        if let Some(patient) = &batch.patient
-            && let Some(profile) = self.profile(patient)
-        {
-            self.scoring.patient(profile, &patient.tasks);
-        }
-        for insertion in self.scoring.take(&batch) {
-            self.score.count(insertion);
+        // What the scripted hand does counts as nobody's.
+        let attempts = batch.attempts.iter().filter_map(|json| Attempt::deserialize(json).ok());
+        for attempt in attempts.filter(|attempt| attempt.by_person) {
+            self.score.count(attempt.figures);
             push(&mut told, Kind::Score, &self.score);
         }
         let status = batch.link.clone();
@@ -99,12 +86,6 @@ impl ClassPublisher {
         }
         told
     }
-
-    /// The patient that counts, from the text that the session gives of it.
-    fn profile(&self, patient: &PatientStatus) -> Option<Profile> {
-        let text = toml::to_string(&patient.profile).ok()?;
-        Profile::parse_for(Text { origin: "the patient".into(), text }, &self.device).ok()
-    }
 }
 
 fn push(messages: &mut Vec<Message>, kind: Kind, what: &impl Serialize) {
@@ -143,12 +124,13 @@ mod tests {
     use crate::class::message::ClassScore;
     use control_core::units::Millimetres;
     use device_sim::procedure::Procedure;
-    use device_sim::procedure::task::Task;
+    use device_sim::profile::Profile;
     use device_sim::session::{self, Publisher, Session, Source};
     use fixed::types::I16F16;
     use link::frames::Pose;
     use recording::messages::Message as Recorded;
     use recording::read::Recording;
+    use training::practice::Practice;
 
     /// A round of the scripted venepuncture on the adult.
     fn recorded() -> (Recording, Profile) {
@@ -160,14 +142,8 @@ mod tests {
         (recording, profile)
     }
 
-    fn open(profile: &Profile, tasks: &[Task]) -> (Session, Publisher) {
-        let (session, publisher) = session::open(profile.scene(Source::Virtual, None));
-        publisher.patient(&PatientStatus {
-            profile: toml::from_str(&profile.source.text).unwrap(),
-            tasks: tasks.to_vec(),
-            ..PatientStatus::default()
-        });
-        (session, publisher)
+    fn open(profile: &Profile) -> (Session, Publisher) {
+        session::open(profile.scene(Source::Virtual, None))
     }
 
     fn read<'a>(
@@ -183,9 +159,9 @@ mod tests {
     #[test]
     fn live_score_equals_the_recordings_and_no_pose_is_lost() {
         let (recording, profile) = recorded();
-        let (session, publisher) = open(&profile, &recording.setup.tasks);
-        let (mut subscription, mut to_class) =
-            (session.subscribe(), ClassPublisher::new(Device::commissioned_virtual()));
+        let (session, publisher) = open(&profile);
+        let mut practice = Practice::new(session.subscribe(), &profile, recording.setup.purpose, true);
+        let (mut subscription, mut to_class) = (session.subscribe(), ClassPublisher::default());
         let (mut messages, mut poses) = (Vec::new(), 0);
         for (number, message) in recording.messages.iter().enumerate() {
             match message {
@@ -204,9 +180,11 @@ mod tests {
             }
             // As often as in a run: every few frames.
             if number % 7 == 0 {
+                practice.judge(&publisher);
                 messages.extend(to_class.take(subscription.drain(), Duration::from_millis(number as u64)));
             }
         }
+        practice.judge(&publisher);
         messages.extend(to_class.take(subscription.drain(), Duration::from_secs(100)));
         // Through JSON too, which costs the last digit.
         let expected =
@@ -216,7 +194,7 @@ mod tests {
             read(&messages, Kind::Score).map(|value| serde_json::from_value(value).unwrap()).collect();
         assert_eq!(told.iter().map(|score| score.last.clone().unwrap()).collect::<Vec<_>>(), expected);
         let last = told.last().unwrap();
-        assert_eq!((last.insertions, last.vessel, last.without_success), (1, 1, 0));
+        assert_eq!((last.insertions, last.passed, last.without_success), (1, 1, 0));
         assert_eq!(
             read(&messages, Kind::Pose).map(|told| told["poses"].as_array().unwrap().len()).sum::<usize>(),
             poses
@@ -232,9 +210,8 @@ mod tests {
 
     #[test]
     fn a_needle_at_rest_in_the_body_and_a_fault_are_reported() {
-        let (session, publisher) = open(&Profile::find("adult").unwrap(), &[]);
-        let (mut subscription, mut to_class) =
-            (session.subscribe(), ClassPublisher::new(Device::commissioned_virtual()));
+        let (session, publisher) = open(&Profile::find("adult").unwrap());
+        let (mut subscription, mut to_class) = (session.subscribe(), ClassPublisher::default());
         let mut about_after = |seconds: u64, depth_mm: f64| {
             let depth = Millimetres(I16F16::from_num(depth_mm));
             publisher.pose(Pose { tick: seconds * 10_000, depth, ..Pose::default() });

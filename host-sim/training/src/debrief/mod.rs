@@ -5,8 +5,7 @@
 mod figures;
 
 use crate::score::gesture::{Gesture, RATE_HZ};
-use crate::score::target::{Reached, TargetOutcome};
-use crate::score::tasks::TaskResult;
+use crate::score::target::Reached;
 use crate::score::{Insertion, Judge, Span, each};
 use control_core::TICK_HZ;
 use device_sim::error::Error;
@@ -51,7 +50,7 @@ fn attempt(
     index: usize,
     span: Span<'_>,
 ) -> Attempt {
-    let gesture = span.gesture(profile.skin_tilt_rad());
+    let gesture = judge.gesture(span);
     let hello = &span.stretch.hello;
     let every = (f64::from(TICK_HZ) / RATE_HZ) as usize;
     let force = span.samples().chunks_exact(every).map(|part| {
@@ -105,7 +104,7 @@ pub fn html(attempts: &[Attempt], expert: &[Attempt]) -> Option<String> {
     let mut sheet = Sheet::new("Debrief", &lead);
     for one in &compared {
         let words = in_words(&one.figures);
-        sheet.paragraph(&format!("{}: {}", one.name, words.join(" ")));
+        sheet.paragraph(&format!("{}: {}. {}", one.name, one.figures.verdict.goal, words.join(" ")));
     }
     sheet.heading("The gesture and what was felt");
     sheet.figures(&pictures(&compared, &scene));
@@ -122,19 +121,11 @@ pub fn html(attempts: &[Attempt], expert: &[Attempt]) -> Option<String> {
     Some(sheet.finish())
 }
 
-/// Returns the quickest attempt that reached its goal without touching what was to be spared, else
-/// the quickest.
+/// Returns the quickest attempt that passed, else the quickest.
 fn best(attempts: &[Attempt]) -> Option<&Attempt> {
-    let failed = |one: &Insertion| {
-        let reached = match &one.target {
-            Some(target) => target.outcome == TargetOutcome::Reached,
-            None => one.punctures > 0,
-        };
-        !reached || one.spared_hits > 0 || one.through_far_wall
-    };
     attempts.iter().min_by(|a, b| {
         let (a, b) = (&a.figures, &b.figures);
-        failed(a).cmp(&failed(b)).then(a.time_s.total_cmp(&b.time_s))
+        b.verdict.passed.cmp(&a.verdict.passed).then(a.time_s.total_cmp(&b.time_s))
     })
 }
 
@@ -220,28 +211,16 @@ fn pictures(compared: &[&Attempt], scene: &Scene) -> Vec<(String, String)> {
 
 /// Returns a teacher's comments.
 fn in_words(one: &Insertion) -> Vec<String> {
-    let mut words = Vec::new();
-    let aims_elsewhere = one.target.as_ref().filter(|target| target.name != "lumen");
-    if let Some(target) = aims_elsewhere {
-        words.push(of_target(target));
-    } else if one.through_far_wall {
-        words.push("The needle went through the vessel's far wall.".to_owned());
-    } else if one.vessel {
-        words.push(format!("The vessel was entered and held for {} s.", decimal(one.in_lumen_s, 1)));
-    } else if one.vessel_contact_path_mm.is_some() {
-        words.push("The vessel was touched and not entered.".to_owned());
-    } else {
-        words.push("The vessel was not met.".to_owned());
-    }
-    if !one.hit.is_empty() {
-        words.push(format!("To be spared and touched, {}: {}.", times(one.spared_hits), one.hit.join(", ")));
+    let mut words = vec![one.verdict.in_words()];
+    match &one.target {
+        Some(target) if target.name != "lumen" => words.push(of_target(target)),
+        _ if one.vessel => {
+            words.push(format!("The needle was in the vein for {} s.", decimal(one.in_lumen_s, 1)));
+        }
+        _ => {}
     }
     if !one.spared.is_empty() {
         words.push(format!("Spared: {}.", one.spared.join(", ")));
-    }
-    if let Some(tasks) = &one.tasks {
-        let each: Vec<String> = tasks.list.iter().map(TaskResult::in_words).collect();
-        words.push(format!("Tasks: {}.", each.join("; ")));
     }
     if one.redirections > 0 {
         words.push(format!("The needle was redirected {}.", times(one.redirections)));
@@ -249,33 +228,16 @@ fn in_words(one: &Insertion) -> Vec<String> {
     if one.barriers > 0 {
         words.push(format!("It was turned further than the tissue allows {}.", times(one.barriers)));
     }
-    if let Some(error) = one.angle_largest_error_deg.filter(|e| e.abs() > 10.0) {
-        let which = if error > 0.0 { "steep" } else { "flat" };
-        words.push(format!("It was too {which} by up to {}°.", decimal(error.abs(), 0)));
-    }
     words
 }
 
-/// Says in a sentence whether a target was reached.
+/// Says in a sentence how long the needle was in a target.
 fn of_target(target: &Reached) -> String {
     let beside = match target.passed_beside {
         0 => String::new(),
         count => format!(" The needle passed beside it {}.", times(count)),
     };
-    let name = &target.name;
-    let said = match target.outcome {
-        TargetOutcome::Missed => format!("The {name} was missed."),
-        TargetOutcome::Reached => {
-            format!("The {name} was reached and held for {} s.", decimal(target.time_s, 1))
-        }
-        TargetOutcome::Beyond => {
-            format!(
-                "The {name} was reached, and the needle went on beyond it; {} s in it.",
-                decimal(target.time_s, 1)
-            )
-        }
-    };
-    said + &beside
+    format!("The needle was in the {} for {} s.{beside}", target.name, decimal(target.time_s, 1))
 }
 
 fn times(count: u32) -> String {
@@ -289,42 +251,35 @@ fn times(count: u32) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::verdict::{Reason, Verdict};
 
     #[test]
     fn what_a_teacher_would_say_follows_from_the_figures() {
-        let good = Insertion { vessel: true, in_lumen_s: 1.25, ..Insertion::default() };
-        assert_eq!(in_words(&good), ["The vessel was entered and held for 1.2 s."]);
+        let verdict = Verdict { passed: true, ..Verdict::default() };
+        let good = Insertion { vessel: true, in_lumen_s: 1.25, verdict, ..Insertion::default() };
+        assert_eq!(in_words(&good), ["Passed.", "The needle was in the vein for 1.2 s."]);
+        let reason = |words: &str| Reason { key: String::new(), words: words.into(), critical: true };
+        let reasons = vec![reason("it went through the far wall"), reason("the tourniquet was left on")];
         let bad = Insertion {
-            through_far_wall: true,
-            spared_hits: 2,
-            hit: vec!["tendon".into()],
+            verdict: Verdict { reasons, ..Verdict::default() },
             spared: vec!["cartilage".into()],
             redirections: 3,
             barriers: 1,
-            angle_largest_error_deg: Some(-14.2),
             ..good
         };
         let said = in_words(&bad).join(" ");
         for words in [
-            "far wall",
-            "touched, twice: tendon.",
+            "Not passed: it went through the far wall; the tourniquet was left on.",
             "Spared: cartilage.",
             "redirected 3 times",
             "tissue allows once",
-            "too flat by up to 14°",
         ] {
             assert!(said.contains(words), "{said}");
         }
-        assert_eq!(in_words(&Insertion::default()), ["The vessel was not met."]);
-        let of = |outcome, passed_beside| {
-            let target = Reached { name: "bursa".into(), outcome, time_s: 0.74, passed_beside };
-            in_words(&Insertion { target: Some(target), ..Insertion::default() }).join(" ")
-        };
-        assert_eq!(of(TargetOutcome::Missed, 1), "The bursa was missed. The needle passed beside it once.");
-        assert_eq!(of(TargetOutcome::Reached, 0), "The bursa was reached and held for 0.7 s.");
-        assert!(
-            of(TargetOutcome::Beyond, 2)
-                .contains("went on beyond it; 0.7 s in it. The needle passed beside it twice.")
-        );
+        assert_eq!(in_words(&Insertion::default()), ["Not finished."]);
+        let target = Reached { name: "bursa".into(), time_s: 0.74, passed_beside: 2, ..Reached::default() };
+        let one = Insertion { target: Some(target), ..Insertion::default() };
+        let said = "The needle was in the bursa for 0.7 s. The needle passed beside it twice.";
+        assert_eq!(in_words(&one)[1], said);
     }
 }

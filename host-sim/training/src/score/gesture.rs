@@ -20,13 +20,16 @@ pub struct Place {
     pub depth_mm: f64,
     /// Angle of the needle to the skin, rad.
     pub angle_rad: f64,
+    /// The place at which its line has depth 0, mm along the skin and below it.
+    pub origin_mm: [f64; 2],
 }
 
 impl Place {
     /// Along the skin and below it, mm.
     pub(crate) fn in_section(self) -> (f64, f64) {
         let (sin, cos) = self.angle_rad.sin_cos();
-        (self.depth_mm * cos, self.depth_mm * sin)
+        let [x, y] = self.origin_mm;
+        (x + self.depth_mm * cos, y + self.depth_mm * sin)
     }
 }
 
@@ -66,10 +69,15 @@ impl Gesture {
         for place in places {
             sum.depth_mm += place.depth_mm;
             sum.angle_rad += place.angle_rad;
+            sum.origin_mm = std::array::from_fn(|axis| sum.origin_mm[axis] + place.origin_mm[axis]);
             counted += 1;
             if counted == many {
                 let share = 1.0 / many as f64;
-                means.push(Place { depth_mm: sum.depth_mm * share, angle_rad: sum.angle_rad * share });
+                means.push(Place {
+                    depth_mm: sum.depth_mm * share,
+                    angle_rad: sum.angle_rad * share,
+                    origin_mm: sum.origin_mm.map(|mm| mm * share),
+                });
                 (sum, counted) = (Place::default(), 0);
             }
         }
@@ -150,7 +158,7 @@ mod tests {
             (0..=50).map(move |i| {
                 let share = f64::from(i) / 50.0;
                 let angle = a0 + share * (a1 - a0);
-                Place { depth_mm: d0 + share * (d1 - d0), angle_rad: angle.to_radians() }
+                Place { depth_mm: d0 + share * (d1 - d0), angle_rad: angle.to_radians(), origin_mm: [0.0; 2] }
             })
         };
         Gesture { places: corners.windows(2).flat_map(line).collect() }
@@ -206,7 +214,8 @@ mod tests {
 
     #[test]
     fn places_are_means_of_their_hundredth_of_a_second() {
-        let fast = (0..1_000).map(|tick| Place { depth_mm: f64::from(tick), angle_rad: 0.5 });
+        let fast =
+            (0..1_000).map(|tick| Place { depth_mm: f64::from(tick), angle_rad: 0.5, origin_mm: [0.0; 2] });
         let gesture = Gesture::new(10_000.0, fast);
         assert_eq!(gesture.places.len(), 10);
         assert!((gesture.places[0].depth_mm - 49.5).abs() < 1e-9);

@@ -1,30 +1,32 @@
 //! A trainee's figures, insertion by insertion: time, path, force, punctures, the vessel, angle,
-//! smoothness. [`gesture`] is the movement, [`vessel`] what it did to the vessel, [`smoothness`] a
-//! measure of any movement; here they are put together.
+//! smoothness. [`gesture`] is the movement, [`course`] what it entered, [`smoothness`] a measure of
+//! any movement; here they are put together, with the verdict.
 
+pub(crate) mod course;
 pub mod gesture;
 mod probe;
 pub mod smoothness;
+mod span;
 pub mod target;
-pub mod tasks;
 pub mod track;
-pub mod vessel;
 
+use crate::goal::Goal as Aim;
+use crate::verdict::{self, Done, Facts, Verdict};
 use control_core::TICK_HZ;
 use control_core::config::{Fixture, Law, Tissue};
 use control_core::controller::Sample;
+use course::{Course, Surroundings};
 use device_sim::error::Error;
-use device_sim::procedure::task::Task;
-use device_sim::profile::{Beside, Goal, Profile};
-use gesture::{Gesture, Place};
+use device_sim::procedure::purpose::Purpose;
+use device_sim::profile::{Goal, Profile};
+use gesture::Gesture;
 use link::frames::{Event, EventKind};
 use recording::read::Recording;
 use recording::stretches::{Stretch, stretches};
 use serde::{Deserialize, Serialize};
+pub use span::Span;
 use std::rc::Rc;
 use target::Reached;
-use tasks::{LayerName, Tasks};
-use vessel::Targets;
 
 /// The name of the score in JSON.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -34,7 +36,7 @@ pub struct Score {
 }
 
 /// One insertion: from the first touch of the outermost layer until the tip has left it, or the
-/// recording ends.
+/// recording ends. Where the goal begins with a task, a second hole in the skin is a part of it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Insertion {
@@ -71,8 +73,8 @@ pub struct Insertion {
     pub spared_hits: u32,
     /// The result for the patient's target; none if the patient has none.
     pub target: Option<Reached>,
-    /// The results of the procedure's tasks; none if it has none.
-    pub tasks: Option<Tasks>,
+    /// The verdict.
+    pub verdict: Verdict,
     /// The names of structures to be spared that were touched.
     pub hit: Vec<String>,
     /// The names of structures to be spared that were not touched.
@@ -106,15 +108,13 @@ pub struct Insertion {
     pub smoothness: Option<f64>,
 }
 
-/// Ticks of an insertion and where they are.
-#[derive(Clone, Copy, Debug)]
-pub struct Span<'a> {
-    /// The whole that it is a part of.
-    pub stretch: &'a Stretch,
-    /// First tick.
-    pub begin: u64,
-    /// Tick after the last.
-    pub end: u64,
+/// The needle may pierce the skin again in the same attempt until it has been out for so long: 5 s.
+const AGAIN_TICKS: u64 = 5 * TICK_HZ as u64;
+
+/// True if the needle came into the vessel in these ticks.
+fn enters_vessel(stretch: &Stretch, (begin, end): (u64, u64)) -> bool {
+    let mut within = stretch.events.iter().filter(|event| (begin..=end).contains(&event.tick));
+    within.any(|event| matches!(event.kind, EventKind::Vessel { .. } | EventKind::Flashback { .. }))
 }
 
 /// All insertions of a recording, judged by one profile or each by the one that it was recorded
@@ -140,95 +140,61 @@ pub fn each(
             None => Rc::new(recording.profile_of(stretch.setup.as_ref().unwrap_or(&recording.setup))?),
         };
         let setup = stretch.setup.as_ref().unwrap_or(&recording.setup);
-        let judge = Judge::new(&profile, &setup.tasks, zero_tick);
-        spans(stretch).into_iter().for_each(|span| see(span, &judge, &profile));
+        let judge = Judge::new(&profile, setup.purpose, zero_tick);
+        judge.spans(stretch).into_iter().for_each(|(span, _)| see(span, &judge, &profile));
     }
     Ok(())
 }
 
-/// Insertions of a stretch: from the touch of layer 0 to leaving it.
-pub fn spans(stretch: &Stretch) -> Vec<Span<'_>> {
-    let span = |begin: u64, end: u64| Span { stretch, begin, end: end.max(begin) };
-    let (mut spans, mut begun) = (Vec::new(), None);
+/// Visits of the skin in a stretch: from the touch of layer 0 to leaving it. The last may not have
+/// ended.
+fn visits(stretch: &Stretch) -> Vec<(u64, Option<u64>)> {
+    let (mut visits, mut begun) = (Vec::new(), None);
     for event in &stretch.events {
         match event.kind {
             EventKind::Contact { layer: 0 } => begun = begun.or(Some(event.tick)),
-            EventKind::Exit { layer: 0 } => spans.extend(begun.take().map(|begin| span(begin, event.tick))),
+            EventKind::Exit { layer: 0 } => {
+                visits.extend(begun.take().map(|begin| (begin, Some(event.tick.max(begin)))));
+            }
             _ => {}
         }
     }
-    spans.extend(begun.map(|begin| span(begin, stretch.end_tick())));
-    spans
-}
-
-impl Span<'_> {
-    /// The movement of its tip; `skin_tilt_rad` is what the tilt reads with the needle laid on the
-    /// skin.
-    pub fn gesture(&self, skin_tilt_rad: f64) -> Gesture {
-        let hello = &self.stretch.hello;
-        let places = self.samples().iter().map(|sample| Place {
-            depth_mm: f64::from(sample.count) * hello.mm_per_count,
-            angle_rad: f64::from(sample.tilt_mrad) * 1e-3 - skin_tilt_rad,
-        });
-        Gesture::new(f64::from(TICK_HZ), places)
-    }
-
-    /// Its samples, 10 kHz.
-    pub fn samples(&self) -> &[Sample] {
-        &self.stretch.samples[self.at(self.begin)..self.at(self.end)]
-    }
-
-    fn at(&self, tick: u64) -> usize {
-        (tick.clamp(self.stretch.first_tick, self.stretch.end_tick()) - self.stretch.first_tick) as usize
-    }
-
-    /// Events in it.
-    pub fn events(&self) -> impl Iterator<Item = &Event> + '_ {
-        self.stretch.events.iter().filter(|e| (self.begin..=self.end).contains(&e.tick))
-    }
-
-    /// Depth along the needle at `tick`, mm.
-    pub fn depth_mm(&self, tick: u64) -> Option<f64> {
-        let sample = self.stretch.samples.get(self.at(tick))?;
-        Some(f64::from(sample.count) * self.stretch.hello.mm_per_count)
-    }
+    visits.extend(begun.map(|begin| (begin, None)));
+    visits
 }
 
 /// The figures by which insertions are judged.
 #[derive(Clone, Debug)]
 pub struct Judge {
     entry_rad: f64,
-    skin_tilt_rad: f64,
-    targets: Targets,
+    aim: Aim,
+    surroundings: Surroundings,
+    vessel: Option<u8>,
     goal: Option<Goal>,
-    tasks: Vec<Task>,
-    /// Names of the layers, outermost first.
-    layers: Vec<LayerName>,
-    /// Number and name of each layer to be spared.
-    spared: Vec<(u8, String)>,
-    beside: Vec<Beside>,
     fixture: Option<Fixture>,
     zero_tick: u64,
 }
 
 impl Judge {
-    /// By `profile` and the tasks of the procedure; times count from `zero_tick`.
-    pub fn new(profile: &Profile, tasks: &[Task], zero_tick: u64) -> Self {
+    /// Times count from here on.
+    pub(crate) fn count_from(&mut self, zero_tick: u64) {
+        self.zero_tick = zero_tick;
+    }
+
+    /// Returns the goal that it judges by.
+    pub(crate) fn aim(&self) -> &Aim {
+        &self.aim
+    }
+
+    /// By `profile` and the purpose of the procedure; times count from `zero_tick`.
+    pub fn new(profile: &Profile, purpose: Option<Purpose>, zero_tick: u64) -> Self {
         let layers = &profile.config.patient.layers;
-        let number = |wanted: Tissue| layers.iter().position(|l| l.tissue == wanted).map(|at| at as u8);
         Self {
             entry_rad: profile.entry_rad,
-            skin_tilt_rad: profile.skin_tilt_rad(),
-            targets: Targets {
-                vessel: number(Tissue::Vessel),
-                far_wall: number(Tissue::FarWall),
-                spared: profile.spared.clone(),
-            },
+            aim: Aim::of(profile, purpose),
+            surroundings: Surroundings::new(profile),
+            vessel: layers.iter().position(|l| l.tissue == Tissue::Vessel).map(|at| at as u8),
             goal: profile.goal(),
-            tasks: tasks.to_vec(),
-            layers: tasks::layer_names(profile),
-            spared: profile.spared.iter().filter_map(|n| Some((*n, profile.layer_name(*n)?))).collect(),
-            beside: profile.beside.clone(),
             fixture: match &profile.config.patient.law {
                 Law::Sparte(law) => Some(law.fixture),
                 Law::Jog(_) | Law::Xr(_) => None,
@@ -245,44 +211,130 @@ impl Judge {
         Some(f64::from(most) * fixture.per_mrad.0.to_num::<f64>())
     }
 
-    /// Returns where the tip was along the skin at `tick`, mm.
-    fn along_mm(&self, span: Span<'_>, tick: u64) -> Option<f64> {
-        let sample = span.stretch.samples.get(span.at(tick))?;
-        let angle_rad = f64::from(sample.tilt_mrad) * 1e-3 - self.skin_tilt_rad;
-        Some(f64::from(sample.count) * span.stretch.hello.mm_per_count * angle_rad.cos())
+    /// The attempts of a stretch, and whether each has ended. Where the goal begins with a task,
+    /// the needle may leave the skin and pierce it again in one attempt: until it has come into the
+    /// vein, the task is done anew, or [`AGAIN_TICKS`] have passed.
+    pub fn spans<'a>(&self, stretch: &'a Stretch) -> Vec<(Span<'a>, bool)> {
+        let mut attempts: Vec<(u64, u64, bool)> = Vec::new();
+        let now = stretch.end_tick();
+        let begins_anew = |from: u64, to: u64| {
+            let first = self.aim.steps.first().and_then(|step| step.task());
+            stretch
+                .tasks
+                .iter()
+                .any(|task| Some(task.name.as_str()) == first && (from..to).contains(&task.tick))
+        };
+        for (begin, end) in visits(stretch) {
+            match attempts.last_mut() {
+                Some((_, last, ended))
+                    if !*ended && !begins_anew(*last, begin) && begin < *last + AGAIN_TICKS =>
+                {
+                    *last = end.unwrap_or(now);
+                }
+                _ => attempts.push((begin, end.unwrap_or(now), false)),
+            }
+            let Some((from, last, ended)) = attempts.last_mut() else { continue };
+            *ended =
+                end.is_some() && (!self.aim.begins_with_task() || enters_vessel(stretch, (*from, *last)));
+        }
+        let later = attempts.iter().map(|(begin, ..)| *begin).skip(1).chain([u64::MAX]).collect::<Vec<_>>();
+        let is_out = visits(stretch).last().is_some_and(|(_, end)| end.is_some());
+        let whole = attempts.into_iter().zip(later).map(|((begin, end, ended), next)| {
+            let waited = is_out && (now >= end + AGAIN_TICKS || begins_anew(end, now));
+            (Span { stretch, begin, end }, ended || next != u64::MAX || waited)
+        });
+        whole.collect()
     }
 
     /// Returns what became of the target, and the visits of it.
-    fn target(&self, span: Span<'_>) -> Option<(Reached, Vec<(u64, u64)>)> {
-        let along_mm = |tick| self.along_mm(span, tick);
+    fn target(&self, span: Span<'_>, course: &Course) -> Option<(Reached, Vec<(u64, u64)>)> {
         let (events, ticks) = (&span.stretch.events, (span.begin, span.end));
         let goal = self.goal.as_ref()?;
-        Some(target::walk(events, ticks, goal, along_mm, 1.0 / f64::from(TICK_HZ)))
+        let is_there = |tick| course.meets_target(tick);
+        let (mut reached, visits) = target::walk(events, ticks, goal, is_there, 1.0 / f64::from(TICK_HZ));
+        reached.passed_beside = reached.passed_beside.max(course.passed_beside);
+        Some((reached, visits))
+    }
+
+    /// Returns the tasks that were done for an attempt: since the needle left the skin the last
+    /// time, and from the first one of the goal on if that was done before.
+    fn done(&self, span: Span<'_>) -> Vec<Done> {
+        let is_end = |event: &&Event| event.tick < span.begin && event.kind == EventKind::Exit { layer: 0 };
+        let since = span.stretch.events.iter().rfind(is_end).map_or(0, |event| event.tick + 1);
+        let told = span.stretch.tasks.iter().filter(|task| (since..=span.end).contains(&task.tick));
+        let done: Vec<Done> = told.map(|task| Done { name: task.name.clone(), tick: task.tick }).collect();
+        let first = self.aim.steps.first().and_then(|step| step.task());
+        let is_first = |one: &Done| one.tick < span.begin && Some(one.name.as_str()) == first;
+        let from = done.iter().position(is_first);
+        let from = from.unwrap_or_else(|| done.iter().take_while(|one| one.tick < span.begin).count());
+        done.into_iter().skip(from).collect()
+    }
+
+    /// The verdict on an attempt, which may be going on.
+    pub fn verdict(&self, span: Span<'_>) -> Verdict {
+        let course = Course::new(span, &self.surroundings);
+        self.judged(span, &course, self.target(span, &course).as_ref())
+    }
+
+    fn judged(
+        &self,
+        span: Span<'_>,
+        course: &Course,
+        target: Option<&(Reached, Vec<(u64, u64)>)>,
+    ) -> Verdict {
+        let target = target.map(|(reached, visits)| (reached.outcome, &visits[..]));
+        verdict::judge(&self.aim, &Facts { course, done: &self.done(span), target })
+    }
+
+    /// The movement of an attempt.
+    pub fn gesture(&self, span: Span<'_>) -> Gesture {
+        Gesture::new(1_000.0, Course::new(span, &self.surroundings).places)
+    }
+
+    /// Returns when the vessel was first touched.
+    fn contact(&self, span: Span<'_>) -> Option<u64> {
+        let layer = self.vessel?;
+        let mut events = span.events();
+        events.find(|event| event.kind == EventKind::Contact { layer }).map(|event| event.tick)
+    }
+
+    /// Returns how often something to be spared was touched, and the names of what was and was not.
+    fn hits(&self, span: Span<'_>, gesture: &Gesture) -> (u32, Vec<String>, Vec<String>) {
+        let Surroundings { spared: layers, beside, .. } = &self.surroundings;
+        let touched =
+            |e: &&Event| layers.iter().any(|(layer, _)| e.kind == EventKind::Contact { layer: *layer });
+        let touches = span.events().filter(touched).count() as u32;
+        let ticks = (span.begin, span.end);
+        let (mut hit, mut spared) = target::hit_and_spared(&span.stretch.events, ticks, layers);
+        let beside_hits = target::beside_hits(&gesture.places, beside, &mut hit, &mut spared);
+        (touches + beside_hits, hit, spared)
     }
 
     /// The figures of one insertion.
     pub fn insertion(&self, span: Span<'_>) -> Insertion {
+        let course = Course::new(span, &self.surroundings);
         let (begin, end) = (span.begin, span.end);
         let samples = span.samples();
         let hello = &span.stretch.hello;
-        let gesture = span.gesture(self.skin_tilt_rad);
+        let gesture = Gesture::new(1_000.0, course.places.iter().copied());
         let deepest = samples.iter().map(|s| s.count).max().unwrap_or(0);
         let depth_mm = f64::from(deepest) * hello.mm_per_count;
         let given = || span.events().filter(|e| matches!(e.kind, EventKind::Puncture { .. }));
-        let passage = vessel::passage(&span.stretch.events, (begin, end), &self.targets);
-        let (target, visits) = self.target(span).unzip();
-        let (mut hit, mut spared) = target::hit_and_spared(&span.stretch.events, (begin, end), &self.spared);
-        let beside_hits = target::beside_hits(&gesture.places, &self.beside, &mut hit, &mut spared);
+        let contact = self.contact(span);
+        let entry = course.lumen.first().map(|(from, _)| *from);
+        let target = self.target(span, &course);
+        let verdict = self.judged(span, &course, target.as_ref());
+        let (spared_hits, hit, spared) = self.hits(span, &gesture);
         let seen = probe::seen(&span.stretch.probes, (begin, end));
         let again = track::met_again(&span.stretch.events, (begin, end));
         let inside = given().next().map_or(&[][..], |e| &span.stretch.samples[span.at(e.tick)..span.at(end)]);
         let first = inside.first();
-        let angle_rad = first.map(|s| f64::from(s.tilt_mrad) * 1e-3 - self.skin_tilt_rad);
+        let angle_rad = first.map(|s| f64::from(s.tilt_mrad) * 1e-3 - self.surroundings.skin_tilt_rad);
         let wanted_rad = self.entry_rad;
         let along = gesture.angle_error(wanted_rad);
         let passes = gesture.passes();
         let seconds = |ticks: u64| ticks as f64 / f64::from(TICK_HZ);
-        let entry_mm = passage.entry_tick.and_then(|tick| span.depth_mm(tick));
+        let entry_mm = entry.and_then(|tick| span.depth_mm(tick));
         Insertion {
             begin_s: seconds(begin.saturating_sub(self.zero_tick)),
             time_s: seconds(end - begin),
@@ -290,17 +342,17 @@ impl Judge {
             depth_mm,
             peak_force_n: samples.iter().map(|s| hello.force_n(s.dac).abs()).fold(0.0, f64::max),
             punctures: given().count() as u32,
-            vessel: passage.entry_tick.is_some(),
-            vessel_contact_path_mm: passage.contact_tick.and_then(|tick| span.depth_mm(tick)),
+            vessel: entry.is_some(),
+            vessel_contact_path_mm: contact.and_then(|tick| span.depth_mm(tick)),
             overshoot_mm: entry_mm.map(|entry| (depth_mm - entry).max(0.0)),
-            in_lumen_s: seconds(passage.in_lumen_ticks),
-            flashbacks: passage.flashbacks,
+            in_lumen_s: course.in_lumen_s(),
+            flashbacks: course.lumen.len() as u32,
             met_in_track: again.in_track,
             pierced_again: again.whole,
-            through_far_wall: passage.through_far_wall,
-            spared_hits: passage.spared_hits + beside_hits,
-            target,
-            tasks: self.tasks(span, &visits.unwrap_or_default()),
+            through_far_wall: course.far_wall.is_some(),
+            spared_hits,
+            target: target.map(|(reached, _)| reached),
+            verdict,
             hit,
             spared,
             barriers: span.events().filter(|e| e.kind == EventKind::Barrier).count() as u32,

@@ -1,9 +1,7 @@
 //! The structures that an insertion was to reach and to spare, by name, from the device's events
 //! and the tip's place along the skin.
 //!
-//! A target is a layer, or a part of it that ends to either side: layers of the device go on for
-//! ever, so that a bursa is missed here only where its patient says how far it reaches. What the
-//! hand feels there is the layer all the same.
+//! A target is a layer, or a part of it that ends to either side.
 
 use super::gesture::Place;
 use device_sim::profile::{Beside, Goal};
@@ -37,32 +35,17 @@ pub struct Reached {
 }
 
 /// Reads `events`, which are in their order in time, of the insertion from `begin` to `end`.
-/// `along_mm` gives the place of the tip along the skin at a tick, and a tick lasts `tick_s`.
-pub fn reached(
-    events: &[Event],
-    (begin, end): (u64, u64),
-    target: &Goal,
-    along_mm: impl Fn(u64) -> Option<f64>,
-    tick_s: f64,
-) -> Reached {
-    walk(events, (begin, end), target, along_mm, tick_s).0
-}
-
-/// Does the same and returns the visits of the target too, each from its first tick to the tick
-/// after its last.
+/// `is_there` says whether the needle's line meets the target at a tick. Returns the visits of the
+/// target too, each from its first tick to the tick after its last.
 pub(super) fn walk(
     events: &[Event],
     (begin, end): (u64, u64),
     target: &Goal,
-    along_mm: impl Fn(u64) -> Option<f64>,
+    is_there: impl Fn(u64) -> bool,
     tick_s: f64,
 ) -> (Reached, Vec<(u64, u64)>) {
     let mut found = Reached { name: target.name.clone(), ..Reached::default() };
     let (mut since, mut visits, mut beyond) = (None::<u64>, Vec::new(), false);
-    let is_there = |tick: u64| match (target.reach_mm, along_mm(tick)) {
-        (Some((from, to)), Some(along)) => (from..=to).contains(&along),
-        _ => true,
-    };
     for event in events.iter().filter(|event| (begin..=end).contains(&event.tick)) {
         let tick = event.tick;
         if enters(&event.kind, target.layer, target.has_wall)
@@ -150,7 +133,8 @@ mod tests {
     }
 
     fn judge(told: &[(u64, EventKind)], target: &Goal, along: impl Fn(u64) -> f64) -> Reached {
-        reached(&at(told), (0, 1_000), target, |tick| Some(along(tick)), 1e-3)
+        let is_there = |tick| target.reach_mm.is_none_or(|(from, to)| (from..=to).contains(&along(tick)));
+        walk(&at(told), (0, 1_000), target, is_there, 1e-3).0
     }
 
     /// Touched at 100, out again at 400: 0.3 s, worked by hand.
@@ -224,7 +208,8 @@ mod tests {
         let vein = Beside { name: "vein".into(), from_mm: 9.0, to_mm: 13.0, top_mm: 3.5, bottom_mm: 6.5 };
         let judge = |degrees: f64, depths_mm: &[f64]| {
             let angle_rad = degrees.to_radians();
-            let places: Vec<Place> = depths_mm.iter().map(|mm| Place { depth_mm: *mm, angle_rad }).collect();
+            let places: Vec<Place> =
+                depths_mm.iter().map(|mm| Place { depth_mm: *mm, angle_rad, origin_mm: [0.0; 2] }).collect();
             let (mut hit, mut spared) = (vec!["tendon".to_owned()], Vec::new());
             let hits = beside_hits(&places, std::slice::from_ref(&vein), &mut hit, &mut spared);
             (hits, hit.len(), spared.len())
