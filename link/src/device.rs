@@ -5,6 +5,7 @@
 mod commands;
 mod guard;
 mod line;
+mod plan_request;
 mod planning;
 mod upload;
 mod waiting;
@@ -25,8 +26,8 @@ use control_core::{AnyOrder, NeedleLine, Order, Plan, TICK_HZ, TickOutput};
 use core::borrow::BorrowMut;
 use guard::Guard;
 use heapless::HistoryBuf;
+pub use plan_request::{PlanRequest, Planned};
 use planning::Planning;
-pub use planning::{PlanRequest, Planned};
 pub use upload::LATE_TICKS;
 use upload::Upload;
 pub use waiting::Waiting;

@@ -1,26 +1,13 @@
 //! The plan that a command asks for. A board makes it where it holds nothing up, and the command
 //! waits for it; a virtual device makes it at once.
 
+use super::plan_request::{PlanRequest, Planned};
 use super::{Endpoint, Waiting};
 use crate::commissioning::may_become;
 use crate::frames::{Command, CommandRefusal, HostFrame};
 use control_core::config::Device;
-use control_core::{Config, LargeOrder, Patient, Plan, Refusal};
+use control_core::{LargeOrder, Plan};
 use core::borrow::BorrowMut;
-
-/// A plan that is to be made.
-#[derive(Clone, Debug)]
-pub struct PlanRequest {
-    number: u32,
-    config: Config,
-    may_leave: bool,
-}
-
-/// A plan that has been made, or why there is none.
-pub struct Planned {
-    number: u32,
-    plan: Result<Plan, Refusal>,
-}
 
 /// The plan that is being made.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -29,18 +16,6 @@ pub(super) struct Planning {
     number: u32,
     /// The id of its command, which has no answer yet.
     id: Option<u32>,
-}
-
-impl PlanRequest {
-    /// Makes the plan, which takes long. A patient for another device leaves; what is wrong with the
-    /// device itself is wrong without a patient too.
-    pub fn make(&self) -> Planned {
-        let plan = match self.config.plan() {
-            Err(_) if self.may_leave => Plan::new(&self.config.device, &Patient::nobody()),
-            plan => plan,
-        };
-        Planned { number: self.number, plan }
-    }
 }
 
 impl<W: BorrowMut<Waiting>> Endpoint<W> {

@@ -1,6 +1,6 @@
 //! The queues at the device's end of the link.
 
-use super::planning::PlanRequest;
+use super::plan_request::PlanRequest;
 use crate::frames::{Ack, Event, SampleBlock};
 use control_core::AnyOrder;
 use heapless::Deque;
@@ -11,8 +11,8 @@ const WAITING_EVENTS: usize = 32;
 const WAITING_ACKS: usize = 16;
 const WAITING_ORDERS: usize = 4;
 
-/// The messages that wait for the PC or for the control law, and what is to be planned. It is large,
-/// may be built in its final place, and takes no flash: all of it begins as zeros.
+/// The messages that wait for the PC or for the control law, and what is to be planned. It is
+/// large, may be built in its final place, and takes no flash: all of it begins as zeros.
 pub struct Waiting {
     pub(super) acks: Deque<Ack, WAITING_ACKS>,
     pub(super) events: Deque<Event, WAITING_EVENTS>,

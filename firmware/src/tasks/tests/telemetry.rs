@@ -194,8 +194,8 @@ fn acks(frames: &[DeviceFrame]) -> Vec<(u32, Result<(), CommandRefusal>)> {
     acks.collect()
 }
 
-/// What depends on the plan that is being made is to be sent again; a stop is answered at once, and
-/// the configuration when its plan is there, unless its PC has gone or has started anew.
+/// While a plan is made a stop is answered at once and a start is to be sent again. The
+/// configuration is answered when its plan is there, unless its PC has started anew.
 #[test]
 fn a_stop_does_not_wait_for_a_plan() {
     for is_new in [false, true] {
