@@ -46,8 +46,10 @@ pub struct Telemetry<B: Board> {
     was_open: bool,
     was_ready: bool,
     in_session: bool,
-    /// The millisecond in which it last wrote to the flash.
+    /// The millisecond in which it last wrote to the flash, or had a plan made for it.
     written_ms: u32,
+    /// The millisecond in which it last took a line.
+    line_ms: u32,
     /// The millisecond in which the last packet came.
     heard_ms: u32,
     /// CRC-32 of both parts of the configuration that is being saved.
@@ -90,6 +92,7 @@ impl<B: Board> Telemetry<B> {
             was_ready: false,
             in_session: false,
             written_ms: 0,
+            line_ms: 0,
             heard_ms: 0,
             saving: None,
         }
@@ -139,7 +142,10 @@ impl<B: Board> Telemetry<B> {
         let saving = Interlocks::of(Interlock::Saving);
         self.endpoint.set_interlocks(Interlocks(self.shared.conditions.get().0 & !saving.0));
         self.endpoint.set_fitted(self.shared.fitted());
-        if let Some(planned) = self.ends.plans_made.dequeue() {
+        // Its hashes for hello and flash take half a millisecond: it pauses as a save does.
+        if !self.save_pauses()
+            && let Some(planned) = self.ends.plans_made.dequeue()
+        {
             self.endpoint.take_plan(planned);
         }
         while let Some(packet) = self.ends.from_pc.dequeue() {
@@ -157,7 +163,12 @@ impl<B: Board> Telemetry<B> {
                 break;
             }
         }
-        if let Some(line) = self.endpoint.take_line() {
+        // The check of a line and its answer take longer than to read ten: one in a millisecond.
+        let ms = self.shared.supervised_ms.load(Relaxed);
+        if ms != self.line_ms
+            && let Some(line) = self.endpoint.take_line()
+        {
+            self.line_ms = ms;
             self.shared.line.set(&line);
         }
         B::allow_usb(true);
@@ -165,6 +176,7 @@ impl<B: Board> Telemetry<B> {
         if self.ends.plans_asked.ready()
             && let Some(request) = self.endpoint.plan_asked()
         {
+            self.written_ms = ms;
             // There is room: just seen.
             let _ = self.ends.plans_asked.enqueue(request);
         }

@@ -69,6 +69,8 @@ impl Desk {
         let woken = world().woken.get();
         self.planner.run();
         if world().woken.get() != woken {
+            // Not before the PC has been silent for a while.
+            self.shared.supervised_ms.fetch_add(timing::QUIET_MS, Relaxed);
             frames.extend(self.turn_without_plan());
         }
         frames
