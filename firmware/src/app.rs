@@ -17,6 +17,7 @@ mod app {
     use crate::board::{Current, Wires};
     use crate::chip::{Statics, Supply, Wiring};
     use core::mem::MaybeUninit;
+    use firmware::tasks::planner::Planner;
     use firmware::tasks::queues::Queues;
     use firmware::tasks::supervisor::Watch;
     use firmware::tasks::telemetry::Telemetry;
@@ -35,6 +36,7 @@ mod app {
         usb: Port<Current>,
         telemetry: &'static mut Telemetry<Current>,
         tilt: Tilt<Current>,
+        planner: Planner<Current>,
     }
 
     // What is large has its place from the start: a `Local` that held it would be moved there over
@@ -76,14 +78,19 @@ mod app {
                 wired.lamps,
             )),
             tilt: Tilt::new(&SHARED, wired.tilt),
+            planner: Planner::new(ends.planner),
         };
         (Shared {}, local)
     }
 
-    /// Nothing to do: sleeps until an interrupt.
-    #[idle]
-    fn idle(_: idle::Context) -> ! {
-        crate::chip::sleep()
+    /// Makes plans; with nothing to do it sleeps until an interrupt.
+    #[idle(local = [planner])]
+    fn idle(context: idle::Context) -> ! {
+        loop {
+            context.local.planner.run();
+            // What is asked for from here on waits for the next tick.
+            crate::chip::sleep();
+        }
     }
 
     /// The control tick. Deadline: the next tick, 100 µs after the timer's edge; a tick that misses

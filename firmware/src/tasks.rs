@@ -2,6 +2,7 @@
 //! touches the drive.
 
 mod latest_line;
+pub mod planner;
 pub mod queues;
 pub mod shared;
 pub mod supervisor;

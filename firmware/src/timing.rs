@@ -119,6 +119,12 @@ pub(crate) const COMMAND_CYCLES: u32 = CORE_HZ / 3_300;
 /// (data sheet: half a word takes 16 µs, 100 µs at most), and a stop is answered in between.
 pub(crate) const SAVE_CYCLES: u32 = CORE_HZ / 2_500;
 
+/// While packets come less than this apart, a save has its share only every [`SAVE_APART_MS`].
+pub(crate) const QUIET_MS: u32 = 3;
+
+/// Longer than a stop may wait, so that at most one share comes before it.
+pub(crate) const SAVE_APART_MS: u32 = 8;
+
 /// Longest time in which the configuration's flash takes half a word (data sheet: 100 µs), in turns
 /// of a loop that reads a register, with a wide margin; a flash that is busy for longer is broken.
 pub const FLASH_WORD_TURNS: u32 = 100_000;

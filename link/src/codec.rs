@@ -67,6 +67,11 @@ impl Decoder {
     /// Takes a byte; at the end of a frame, the frame or the word that it was none. Empty frames
     /// are passed over.
     pub fn push<F: DeserializeOwned>(&mut self, byte: u8) -> Option<Result<F, Garbage>> {
+        Some(self.push_body(byte)?.and_then(read))
+    }
+
+    /// [`Self::push`] without a look into the frame.
+    pub(crate) fn push_body(&mut self, byte: u8) -> Option<Result<&[u8], Garbage>> {
         if byte != 0 {
             match self.buffer.get_mut(self.filled) {
                 Some(place) => {
@@ -82,7 +87,7 @@ impl Decoder {
             return Some(Err(Garbage));
         }
         let coded = self.buffer.get_mut(..filled).filter(|coded| !coded.is_empty())?;
-        Some(decode(coded))
+        Some(body(coded))
     }
 
     /// Takes bytes from the front of `bytes` up to the end of a frame, as [`Self::push`] does one
@@ -117,13 +122,16 @@ impl Decoder {
     }
 }
 
-fn decode<F: DeserializeOwned>(coded: &mut [u8]) -> Result<F, Garbage> {
+/// Returns the bytes of a frame that is sound.
+fn body(coded: &mut [u8]) -> Result<&[u8], Garbage> {
     let length = cobs::decode_in_place(coded).map_err(|_| Garbage)?;
     let plain = coded.get(..length).ok_or(Garbage)?;
     let (body, check) = plain.split_last_chunk::<CRC_BYTES>().ok_or(Garbage)?;
-    if CRC.checksum(body) != u32::from_le_bytes(*check) {
-        return Err(Garbage);
-    }
+    if CRC.checksum(body) == u32::from_le_bytes(*check) { Ok(body) } else { Err(Garbage) }
+}
+
+/// Reads a frame, which is all of `body`.
+pub(crate) fn read<F: DeserializeOwned>(body: &[u8]) -> Result<F, Garbage> {
     match postcard::take_from_bytes(body) {
         Ok((frame, [])) => Ok(frame),
         _ => Err(Garbage),

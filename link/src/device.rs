@@ -4,6 +4,9 @@
 
 mod commands;
 mod guard;
+mod line;
+mod plan_request;
+mod planning;
 mod upload;
 mod waiting;
 
@@ -23,6 +26,8 @@ use control_core::{AnyOrder, NeedleLine, Order, Plan, TICK_HZ, TickOutput};
 use core::borrow::BorrowMut;
 use guard::Guard;
 use heapless::HistoryBuf;
+pub use plan_request::{PlanRequest, Planned};
+use planning::Planning;
 pub use upload::LATE_TICKS;
 use upload::Upload;
 pub use waiting::Waiting;
@@ -94,6 +99,7 @@ pub struct Endpoint<W = Waiting> {
     /// The optional sensors that are there, where somebody looks.
     fitted: Option<Sensors>,
     guard: Guard,
+    planning: Planning,
     limits: Limits,
     fault: Option<Fault>,
     crash: Option<Crash>,
@@ -141,6 +147,7 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
             interlocks: Interlocks::default(),
             fitted: None,
             guard: Guard::default(),
+            planning: Planning::default(),
             limits: Limits::default(),
             fault: reset_cause,
             crash: None,
@@ -163,11 +170,26 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
 
     /// Takes bytes from the PC, in pieces of any size.
     pub fn receive(&mut self, bytes: &[u8]) {
+        for byte in bytes {
+            self.receive_and_plan_later(core::slice::from_ref(byte));
+            if let Some(request) = self.plan_asked() {
+                self.take_plan(request.make());
+            }
+        }
+    }
+
+    /// Takes bytes from the PC for a board, which makes what [`Self::plan_asked`] asks for where it
+    /// holds nothing up.
+    pub fn receive_and_plan_later(&mut self, bytes: &[u8]) {
         for &byte in bytes {
-            match self.decoder.push::<HostFrame>(byte) {
-                Some(Ok(frame)) => self.command(frame),
-                Some(Err(_)) => self.timing.garbage_frames = self.timing.garbage_frames.saturating_add(1),
-                None => {}
+            let Some(body) = self.decoder.push_body(byte) else { continue };
+            if let Ok(Some(line)) = body.map(line::read) {
+                self.line_due = Some(line);
+                continue;
+            }
+            match body.and_then(codec::read::<HostFrame>) {
+                Ok(frame) => self.command(frame),
+                Err(_) => self.timing.garbage_frames = self.timing.garbage_frames.saturating_add(1),
             }
         }
     }
@@ -187,6 +209,7 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
         self.waiting.borrow_mut().acks.clear();
         (self.line_due, self.line_ack) = (None, None);
         self.drop_starts();
+        self.forget_plan();
         self.decoder = Decoder::default();
         self.forget_waiting();
     }
@@ -223,16 +246,6 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
     /// more.
     pub fn take_stop(&mut self) -> bool {
         core::mem::take(&mut self.stop_due)
-    }
-
-    /// Returns the latest line once, if it is sound, and answers it; those that it has overtaken
-    /// are not answered. It overtakes the orders too: whoever passes them on to the control law
-    /// gives it this first. It is checked here, so that many of them hold nothing up.
-    pub fn take_line(&mut self) -> Option<NeedleLine> {
-        let (id, line) = self.line_due.take()?;
-        let result = self.plan.check_line(&line).map_err(CommandRefusal::Config);
-        self.line_ack = Some(Ack { id, result });
-        result.is_ok().then_some(line)
     }
 
     /// The configuration in force was not saved.

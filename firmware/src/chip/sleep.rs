@@ -1,7 +1,7 @@
 //! Sleep between interrupts.
 #![allow(unsafe_code, reason = "an instruction of the core, and a place for it")]
 
-/// Sleeps until an interrupt, and after it again.
+/// Sleeps until an interrupt.
 ///
 /// ES0182 2.1.3, "Debugging Sleep/Stop mode with WFE/WFI entry": with `DBG_SLEEP` set, which the
 /// cycle counter needs, a core that wakes may carry out instructions that it never fetched, where
@@ -10,9 +10,7 @@
 // SAFETY: start-up copies `.data` from the flash, code among it (`cortex-m-rt`), before this runs.
 #[inline(never)]
 #[unsafe(link_section = ".data.sleep")]
-pub(crate) fn sleep() -> ! {
-    loop {
-        // SAFETY: neither touches memory or a register.
-        unsafe { core::arch::asm!("wfi", "nop", "nop", "nop", options(nomem, nostack, preserves_flags)) };
-    }
+pub(crate) fn sleep() {
+    // SAFETY: neither touches memory or a register.
+    unsafe { core::arch::asm!("wfi", "nop", "nop", "nop", options(nomem, nostack, preserves_flags)) };
 }

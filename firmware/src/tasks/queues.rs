@@ -4,7 +4,7 @@ use control_core::excitation::Segments;
 use control_core::{LargeOrder, Order, TickOutput};
 use heapless::Vec;
 use heapless::spsc::{Consumer, Producer, Queue};
-use link::device::Waiting;
+use link::device::{PlanRequest, Planned, Waiting};
 
 /// A bulk packet of USB at full speed.
 pub const PACKET_BYTES: usize = 64;
@@ -36,6 +36,8 @@ pub struct Queues {
     large_orders: Queue<LargeOrder, 2>,
     // 25 ms of samples: as long as telemetry may hang before it is found out.
     outputs: Queue<Ticked, 256>,
+    plans_asked: Queue<PlanRequest, 2>,
+    plans_made: Queue<Planned, 2>,
     // 1 KiB: more than any command; while it is full, USB makes the PC wait.
     from_pc: Queue<Packet, 16>,
     // 4 KiB: what a full-speed host takes in 4 ms at worst, 40 ms of stream.
@@ -62,6 +64,14 @@ pub struct UsbEnds {
     pub to_pc: Consumer<'static, Packet>,
 }
 
+/// The planner's ends.
+pub struct PlannerEnds {
+    /// From telemetry.
+    pub asked: Consumer<'static, PlanRequest>,
+    /// To telemetry.
+    pub made: Producer<'static, Planned>,
+}
+
 /// Telemetry's ends.
 pub struct TelemetryEnds {
     /// To the tick.
@@ -70,6 +80,10 @@ pub struct TelemetryEnds {
     pub large_orders: Producer<'static, LargeOrder>,
     /// From the tick.
     pub outputs: Consumer<'static, Ticked>,
+    /// To the planner.
+    pub plans_asked: Producer<'static, PlanRequest>,
+    /// From the planner.
+    pub plans_made: Consumer<'static, Planned>,
     /// From the USB task.
     pub from_pc: Consumer<'static, Packet>,
     /// To the USB task.
@@ -83,6 +97,8 @@ pub struct Ends {
     pub tick: (TickEnds, &'static mut Segments),
     /// The USB task's.
     pub usb: UsbEnds,
+    /// The planner's.
+    pub planner: PlannerEnds,
     /// Telemetry's, and its memory for what waits.
     pub telemetry: (TelemetryEnds, &'static mut Waiting),
 }
@@ -100,6 +116,8 @@ impl Queues {
             orders: Queue::new(),
             large_orders: Queue::new(),
             outputs: Queue::new(),
+            plans_asked: Queue::new(),
+            plans_made: Queue::new(),
             from_pc: Queue::new(),
             to_pc: Queue::new(),
             waiting: Waiting::new(),
@@ -112,16 +130,21 @@ impl Queues {
         let (orders_in, orders) = self.orders.split();
         let (large_in, large_orders) = self.large_orders.split();
         let (outputs, outputs_out) = self.outputs.split();
+        let (asked_in, asked) = self.plans_asked.split();
+        let (made, made_out) = self.plans_made.split();
         let (from_pc, from_pc_out) = self.from_pc.split();
         let (to_pc_in, to_pc) = self.to_pc.split();
         Ends {
             tick: (TickEnds { orders, large_orders, outputs }, &mut self.segments),
             usb: UsbEnds { from_pc, to_pc },
+            planner: PlannerEnds { asked, made },
             telemetry: (
                 TelemetryEnds {
                     orders: orders_in,
                     large_orders: large_in,
                     outputs: outputs_out,
+                    plans_asked: asked_in,
+                    plans_made: made_out,
                     from_pc: from_pc_out,
                     to_pc: to_pc_in,
                 },

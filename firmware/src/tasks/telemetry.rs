@@ -46,8 +46,12 @@ pub struct Telemetry<B: Board> {
     was_open: bool,
     was_ready: bool,
     in_session: bool,
-    /// The millisecond in which it last wrote to the flash.
+    /// The millisecond in which it last wrote to the flash, or had a plan made for it.
     written_ms: u32,
+    /// The millisecond in which it last took a line.
+    line_ms: u32,
+    /// The millisecond in which the last packet came.
+    heard_ms: u32,
     /// CRC-32 of both parts of the configuration that is being saved.
     saving: Option<(u32, u32)>,
 }
@@ -87,7 +91,9 @@ impl<B: Board> Telemetry<B> {
             was_open: false,
             was_ready: false,
             in_session: false,
-            written_ms: u32::MAX,
+            written_ms: 0,
+            line_ms: 0,
+            heard_ms: 0,
             saving: None,
         }
     }
@@ -129,15 +135,22 @@ impl<B: Board> Telemetry<B> {
         self.was_ready = is_ready;
     }
 
-    /// Commands that take long, as a configuration does with 2 ms, end the turn: what comes after
-    /// them has the next one, so that telemetry reports between them.
+    /// Many commands end the turn: what comes after them has the next one, so that telemetry
+    /// reports between them.
     fn take_commands(&mut self, entered: u32) {
         // A start that follows a configuration waits behind it.
         let saving = Interlocks::of(Interlock::Saving);
         self.endpoint.set_interlocks(Interlocks(self.shared.conditions.get().0 & !saving.0));
         self.endpoint.set_fitted(self.shared.fitted());
+        // Its hashes for hello and flash take half a millisecond: it pauses as a save does.
+        if !self.save_pauses()
+            && let Some(planned) = self.ends.plans_made.dequeue()
+        {
+            self.endpoint.take_plan(planned);
+        }
         while let Some(packet) = self.ends.from_pc.dequeue() {
-            self.endpoint.receive(&packet);
+            self.heard_ms = self.shared.supervised_ms.load(Relaxed);
+            self.endpoint.receive_and_plan_later(&packet);
             if self.endpoint.take_stop() {
                 self.stop();
                 // Its answer waits for nothing that came after it.
@@ -150,11 +163,23 @@ impl<B: Board> Telemetry<B> {
                 break;
             }
         }
-        if let Some(line) = self.endpoint.take_line() {
+        // The check of a line and its answer take longer than to read ten: one in a millisecond.
+        let ms = self.shared.supervised_ms.load(Relaxed);
+        if ms != self.line_ms
+            && let Some(line) = self.endpoint.take_line()
+        {
+            self.line_ms = ms;
             self.shared.line.set(&line);
         }
         B::allow_usb(true);
         self.forward_orders();
+        if self.ends.plans_asked.ready()
+            && let Some(request) = self.endpoint.plan_asked()
+        {
+            self.written_ms = ms;
+            // There is room: just seen.
+            let _ = self.ends.plans_asked.enqueue(request);
+        }
         self.guard_supply();
         let in_session = self.endpoint.in_session();
         if in_session && !self.in_session {
@@ -190,6 +215,10 @@ impl<B: Board> Telemetry<B> {
 
     /// Passes orders on until there are no more or the tick has no room.
     fn forward_orders(&mut self) {
+        // It is large: taking it out and putting it back for each packet takes longer than a line.
+        if self.saving.is_some() && self.save_pauses() {
+            return;
+        }
         while let Some(order) = self.held.take().or_else(|| self.endpoint.next_order()) {
             let is_large = matches!(order, AnyOrder::Large(_));
             if !self.ends.orders.ready() || is_large && !self.ends.large_orders.ready() {
@@ -237,11 +266,10 @@ impl<B: Board> Telemetry<B> {
         let hashes = *self
             .saving
             .get_or_insert_with(|| (link::codec::hash(plan.device()), link::codec::hash(plan.patient())));
-        let ms = self.shared.supervised_ms.load(Relaxed);
-        if hashes != self.saved && ms == self.written_ms {
+        if hashes != self.saved && self.save_pauses() {
             return Err(Unfinished);
         }
-        self.written_ms = ms;
+        self.written_ms = self.shared.supervised_ms.load(Relaxed);
         self.shared.conditions.set(Interlock::Saving, true);
         let error = match self.save_parts(plan, hashes) {
             Err(StoreError::Unfinished) => return Err(Unfinished),
@@ -257,6 +285,14 @@ impl<B: Board> Telemetry<B> {
             self.endpoint.not_saved(self.next_tick, error);
         }
         Ok(())
+    }
+
+    /// True if a save has had its share of time. The flash stops the processor while it is written,
+    /// and where packets come a stop may be among them.
+    fn save_pauses(&self) -> bool {
+        let ms = self.shared.supervised_ms.load(Relaxed);
+        let hears = ms.wrapping_sub(self.heard_ms) < timing::QUIET_MS;
+        ms.wrapping_sub(self.written_ms) < if hears { timing::SAVE_APART_MS } else { 1 }
     }
 
     fn save_parts(&mut self, plan: &Plan, (device, patient): (u32, u32)) -> Result<(), StoreError> {

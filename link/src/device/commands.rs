@@ -1,14 +1,14 @@
 //! The PC's commands: each is carried out or refused, and answered.
 
 use super::{Endpoint, Waiting};
-use crate::commissioning::{Proof, may_become};
+use crate::commissioning::Proof;
 use crate::frames::{Ack, Command, CommandRefusal, EventKind, HostFrame, PROTOCOL_VERSION};
 use control_core::compensation::check::check;
-use control_core::config::{Device, Sensors};
+use control_core::config::Sensors;
 use control_core::excitation::Excitation;
 use control_core::interlock::Interlock;
 use control_core::units::Counts;
-use control_core::{LargeOrder, Order, Patient, Plan, TICK_HZ};
+use control_core::{LargeOrder, Order, TICK_HZ};
 use core::borrow::BorrowMut;
 
 /// True if the command is only for a device whose torque is off.
@@ -36,6 +36,11 @@ fn makes_plan(command: &Command) -> bool {
     )
 }
 
+/// True if the command may mean another thing under another plan.
+fn depends_on_plan(command: &Command) -> bool {
+    !matches!(command, Command::Hello { .. } | Command::Heartbeat | Command::Stop | Command::Clear)
+}
+
 /// True if the command turns the amplifier on.
 fn gives_torque(command: &Command) -> bool {
     matches!(command, Command::Start | Command::Excite(_) | Command::Play { .. })
@@ -59,21 +64,33 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
             // A PC that starts anew may use old ids again.
             self.answered.clear();
             self.last_stop = None;
+            self.forget_plan();
+        } else if self.plans_for(frame.id) {
+            return;
         } else if let Some(ack) = self.answered.oldest_ordered().find(|ack| ack.id == frame.id) {
             let _ = self.waiting.borrow_mut().acks.push_back(*ack);
             return;
         }
         if let Command::GuardSupply { set } = frame.command
+            && !self.is_planning()
             && self.defer_guard(frame.id, set)
         {
             return;
         }
-        if let Command::Line(line) = frame.command {
-            self.line_due = Some((frame.id, line));
-            return;
-        }
-        let result = self.carry_out(frame.id, frame.command);
-        let ack = Ack { id: frame.id, result };
+        let id = frame.id;
+        let result = match self.check_turn(id, &frame.command) {
+            Ok(()) if makes_plan(&frame.command) => match self.ask_for_plan(frame) {
+                Ok(()) => return,
+                refused => refused,
+            },
+            Ok(()) => self.carry_out(id, frame.command),
+            refused => refused,
+        };
+        self.answer(id, result);
+    }
+
+    pub(super) fn answer(&mut self, id: u32, result: Result<(), CommandRefusal>) {
+        let ack = Ack { id, result };
         if result != Err(CommandRefusal::Full) {
             self.answered.write(ack);
         }
@@ -91,14 +108,14 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
         if self.has_torque() && needs_torque_off(command) {
             return Err(CommandRefusal::Powered);
         }
-        if makes_plan(command) && self.waiting.borrow().orders.is_full() {
+        let is_busy = if makes_plan(command) { self.waiting.borrow().orders.is_full() } else { false };
+        if is_busy || self.is_planning() && depends_on_plan(command) {
             return Err(CommandRefusal::Full);
         }
         if gives_torque(command) { self.is_later_than_stop(id) } else { Ok(()) }
     }
 
     fn carry_out(&mut self, id: u32, command: Command) -> Result<(), CommandRefusal> {
-        self.check_turn(id, &command)?;
         match command {
             Command::Hello { version } => self.hello_to(version),
             Command::Heartbeat => self.order(Order::Heartbeat),
@@ -115,28 +132,6 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
                 Ok(())
             }
             Command::Excite(excitation) => self.excite(excitation),
-            Command::ConfigurePatient(patient) => {
-                self.configure(Plan::new(self.plan.device(), &patient).map_err(CommandRefusal::Config)?)
-            }
-            Command::ConfigureDevice(device) => {
-                may_become(self.plan.device(), &device)?;
-                self.configure_device(&device)
-            }
-            Command::RestoreDevice(record) => {
-                if !record.is_of(self.identity.serial) {
-                    may_become(self.plan.device(), &record.device)?;
-                }
-                self.configure_device(&record.device)
-            }
-            Command::Commission => {
-                let device = self.plan.device();
-                let sensors = self.fitted.unwrap_or(device.sensors);
-                let device = Device { commissioned: true, sensors, ..*device };
-                if !self.proof.is_shown() {
-                    may_become(self.plan.device(), &device)?;
-                }
-                self.configure_device(&device)
-            }
             Command::ReportDevice => {
                 self.device_due = true;
                 Ok(())
@@ -148,8 +143,14 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
             Command::Index(index) => self.order(LargeOrder::Index(index.map(Counts))),
             Command::Segment { index, excitation } => self.upload(index, excitation),
             Command::Play { count, checksum } => self.play(count, checksum),
-            // Nothing to guard: a board would have deferred it. A line has gone its own way.
-            Command::GuardSupply { .. } | Command::Line(_) => Ok(()),
+            // Nothing to guard: a board would have deferred it. A line has gone its own way, and so
+            // has what asks for a plan.
+            Command::GuardSupply { .. }
+            | Command::Line(_)
+            | Command::ConfigurePatient(_)
+            | Command::ConfigureDevice(_)
+            | Command::RestoreDevice(_)
+            | Command::Commission => Ok(()),
         }
     }
 
@@ -270,31 +271,5 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
             return Err(CommandRefusal::Interlocked(interlock));
         }
         self.fault.map_or(Ok(()), |fault| Err(CommandRefusal::Faulted(fault)))
-    }
-
-    /// A patient for another device leaves; what is wrong with the device itself is wrong without a
-    /// patient too.
-    fn configure_device(&mut self, device: &Device) -> Result<(), CommandRefusal> {
-        self.identity.ceilings.check(device).map_err(CommandRefusal::Config)?;
-        let plan = Plan::new(device, self.plan.patient())
-            .or_else(|_| Plan::new(device, &Patient::nobody()))
-            .map_err(CommandRefusal::Config)?;
-        let before = *self.plan.device();
-        self.configure(plan)?;
-        self.proof.keep(&before, device);
-        let counts =
-            |device: &Device| (device.encoder_reversed, device.counts_per_turn, device.roller_radius);
-        // Otherwise the same counts are another depth.
-        self.zeroed &= counts(&before) == counts(device);
-        Ok(())
-    }
-
-    fn configure(&mut self, plan: Plan) -> Result<(), CommandRefusal> {
-        self.order(LargeOrder::Configure(plan.clone()))?;
-        self.plan = plan;
-        self.line_due = None;
-        self.upload.forget();
-        self.hello_due = true;
-        Ok(())
     }
 }

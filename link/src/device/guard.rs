@@ -4,7 +4,7 @@
 //! [`Command::GuardSupply`]: crate::Command::GuardSupply
 
 use super::{Endpoint, Waiting};
-use crate::frames::{Ack, CommandRefusal};
+use crate::frames::CommandRefusal;
 use core::borrow::BorrowMut;
 
 /// The command's state.
@@ -44,9 +44,7 @@ impl<W: BorrowMut<Waiting>> Endpoint<W> {
     pub fn answer_guard(&mut self, result: Result<(), CommandRefusal>) {
         if let Guard::Asked(id, _) = self.guard {
             self.guard = Guard::Idle;
-            let ack = Ack { id, result };
-            self.answered.write(ack);
-            let _ = self.waiting.borrow_mut().acks.push_back(ack);
+            self.answer(id, result);
         }
     }
 }

@@ -82,8 +82,10 @@ fn power_lost_before_each(step: usize) {
             array.cut_before = Some(array.operations + write);
         }
         pc.send(&mut board, Command::ConfigureDevice(changed().device));
+        // Its plan is taken once the PC has been silent for a while.
+        board.run_ms(4);
         pc.send(&mut board, Command::ConfigurePatient(changed().patient));
-        board.run_ms(30);
+        board.run_ms(40);
         assert!(board.flash().array().cut_before.is_none(), "the power went before write {write}");
         board.run_ms(20);
         pc.connect(&mut board);

@@ -1,6 +1,6 @@
 //! A board made of memory, and the tasks' ends on it.
 
-use super::super::queues::{Queued, Queues, TelemetryEnds, TickEnds, UsbEnds};
+use super::super::queues::{Ends, Queued, Queues, TelemetryEnds};
 use super::super::shared::Shared;
 use super::super::tick::Tick;
 use crate::drive::{Drive, MotorDac, Two};
@@ -12,14 +12,12 @@ use crate::tilt::{Reading, TiltSource};
 use crate::timing;
 use crate::wire_check::{Pull, PulledLines};
 use control_core::config::DacWidth;
-use control_core::excitation::Segments;
 use control_core::units::{Counts, DacCode};
 use control_core::{Device, Order, Patient, Plan};
 use core::cell::{Cell, RefCell};
 use core::convert::Infallible;
 use core::sync::atomic::Ordering::Relaxed;
 use embedded_hal::digital::{ErrorType, OutputPin};
-use link::device::Waiting;
 use link::frames::GuardRefusal;
 use std::boxed::Box;
 use std::collections::VecDeque;
@@ -277,16 +275,15 @@ pub(super) fn shared() -> &'static Shared {
 }
 
 /// The ends of queues that live as long as the test's process.
-pub(super) fn ends() -> ((TickEnds, &'static mut Segments), UsbEnds, (TelemetryEnds, &'static mut Waiting)) {
+pub(super) fn ends() -> Ends {
     let queues: &'static mut Queues = Box::leak(Box::new(Queues::new()));
-    let ends = queues.split();
-    (ends.tick, ends.usb, ends.telemetry)
+    queues.split()
 }
 
 /// A tick with its far ends; nothing has run yet.
 pub(super) fn tick() -> (Tick<Fake>, &'static Shared, TelemetryEnds) {
     let shared = shared();
-    let (tick_ends, _, (telemetry, _)) = ends();
+    let Ends { tick: tick_ends, telemetry: (telemetry, _), .. } = ends();
     let drive = Drive::new(Two { wide: Part, narrow: Eight }, Part);
     (Tick::new(shared, (Part, Part, drive), &plan(), Some(0), tick_ends), shared, telemetry)
 }

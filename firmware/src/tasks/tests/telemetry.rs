@@ -1,6 +1,7 @@
 //! Telemetry.
 
-use super::super::queues::{Packet, Queued, TickEnds, Ticked, UsbEnds};
+use super::super::planner::Planner;
+use super::super::queues::{Ends, Packet, Queued, TickEnds, Ticked, UsbEnds};
 use super::super::shared::{LINK_CONFIGURED, LINK_READY, Shared};
 use super::super::telemetry::Telemetry;
 use super::fake::{Fake, Part, Words, ends, plan, shared, world};
@@ -21,6 +22,7 @@ use std::vec::Vec;
 /// Telemetry with a PC at the far ends of its queues.
 struct Desk {
     telemetry: Telemetry<Fake>,
+    planner: Planner<Fake>,
     shared: &'static Shared,
     tick: TickEnds,
     usb: UsbEnds,
@@ -31,14 +33,16 @@ struct Desk {
 impl Desk {
     fn new() -> Self {
         let shared = shared();
-        let ((tick, _), usb, telemetry_ends) = ends();
+        let Ends { tick: (tick, _), usb, planner, telemetry: telemetry_ends } = ends();
         let identity = Identity { firmware: [1, 2, 3], ..Identity::VIRTUAL };
         let blank = || std::vec![u32::MAX; Words::CELLS * CELL_WORDS];
         let (store, ..) = Store::open(Words([blank(), blank()]));
         let telemetry =
             Telemetry::new(shared, (identity, &plan(), None, None, true), store, telemetry_ends, Part);
         shared.link.store(LINK_CONFIGURED | LINK_READY, Relaxed);
-        Self { telemetry, shared, tick, usb, commands: Commands::default(), reception: Reception::default() }
+        let (planner, commands, reception) =
+            (Planner::new(planner), Commands::default(), Reception::default());
+        Self { telemetry, planner, shared, tick, usb, commands, reception }
     }
 
     fn in_session() -> Self {
@@ -58,8 +62,21 @@ impl Desk {
         id
     }
 
-    /// One run of the task, a millisecond after the last, and what it said.
+    /// One run of the task, a millisecond after the last, another one where there was something to
+    /// plan, and what it said.
     fn turn(&mut self) -> Vec<DeviceFrame> {
+        let mut frames = self.turn_without_plan();
+        let woken = world().woken.get();
+        self.planner.run();
+        if world().woken.get() != woken {
+            // Not before the PC has been silent for a while.
+            self.shared.supervised_ms.fetch_add(timing::QUIET_MS, Relaxed);
+            frames.extend(self.turn_without_plan());
+        }
+        frames
+    }
+
+    fn turn_without_plan(&mut self) -> Vec<DeviceFrame> {
         self.shared.supervised_ms.fetch_add(1, Relaxed);
         self.telemetry.run();
         let packets: Vec<Packet> = core::iter::from_fn(|| self.usb.to_pc.dequeue()).collect();
@@ -124,13 +141,15 @@ fn a_configuration_is_saved_without_torque_or_reported_failed() {
     assert!(desk.tick.orders.dequeue().is_none());
     desk.shared.powered.store(false, Relaxed);
     assert_eq!(desk.answer(Command::ConfigureDevice(config)), Ok(()));
+    // Not before the PC has been silent for a while.
+    (0..timing::QUIET_MS).for_each(|_| drop(desk.turn()));
     assert!(matches!(desk.tick.orders.dequeue(), Some(Queued { order: None, .. })));
     assert!(desk.tick.large_orders.dequeue().is_some());
     assert!(!desk.shared.conditions.get().contains(Interlock::Saving));
     world().flash_fails.set(true);
     config.limits.fade_in_ms = 445;
     desk.say(Command::ConfigureDevice(config));
-    let frames: Vec<DeviceFrame> = (0..3).flat_map(|_| desk.turn()).collect();
+    let frames: Vec<DeviceFrame> = (0..=timing::QUIET_MS).flat_map(|_| desk.turn()).collect();
     let wanted = EventKind::NotSaved { cause: SaveError::Flash };
     assert!(
         frames.iter().any(|frame| matches!(frame, DeviceFrame::Event(event) if event.kind == wanted)),
@@ -166,6 +185,42 @@ fn a_save_takes_many_turns_and_outlives_its_pc() {
         assert_eq!((has_started, orders.len()), (!is_gone, if is_gone { 2 } else { 3 }));
         let Some(LargeOrder::Configure(plan)) = plans.last() else { panic!("a plan") };
         assert_eq!((plan.device(), plan.patient()), (&config, &Patient::nobody()));
+    }
+}
+
+fn acks(frames: &[DeviceFrame]) -> Vec<(u32, Result<(), CommandRefusal>)> {
+    let acks = frames.iter().filter_map(|frame| match frame {
+        DeviceFrame::Ack(ack) => Some((ack.id, ack.result)),
+        _ => None,
+    });
+    acks.collect()
+}
+
+/// While a plan is made a stop is answered at once and a start is to be sent again. The
+/// configuration is answered when its plan is there, unless its PC has started anew.
+#[test]
+fn a_stop_does_not_wait_for_a_plan() {
+    for is_new in [false, true] {
+        let mut desk = Desk::in_session();
+        let configure = desk.say(Command::ConfigurePatient(Patient::nobody()));
+        assert!(acks(&desk.turn_without_plan()).is_empty());
+        let (start, stop) = (desk.say(Command::Start), desk.say(Command::Stop));
+        let answers = acks(&desk.turn_without_plan());
+        assert_eq!(answers, [(start, Err(CommandRefusal::Full)), (stop, Ok(()))]);
+        assert!(desk.shared.trips.take_stop());
+        if is_new {
+            let hello = desk.say(Command::Hello { version: PROTOCOL_VERSION });
+            assert_eq!(acks(&desk.turn_without_plan()), [(hello, Ok(()))]);
+        }
+        let answers = acks(&desk.turn());
+        assert_eq!(answers, if is_new { std::vec![] } else { std::vec![(configure, Ok(()))] });
+        let plan = (0..99).find_map(|_| {
+            desk.turn();
+            desk.tick.large_orders.dequeue()
+        });
+        assert_eq!(plan.is_some(), !is_new);
+        // The device is free for the next one either way.
+        assert_eq!(desk.answer(Command::ConfigurePatient(Patient::default())), Ok(()));
     }
 }
 

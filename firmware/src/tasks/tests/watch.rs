@@ -1,6 +1,6 @@
 //! Supervisor, tilt and USB.
 
-use super::super::queues::Packet;
+use super::super::queues::{Ends, Packet};
 use super::super::shared::{LINK_CONFIGURED, LINK_READY, Shared};
 use super::super::supervisor::Watch;
 use super::super::tilt::Tilt;
@@ -124,7 +124,7 @@ fn a_device_starts_only_with_a_tilt_sensor_that_measures() {
 #[test]
 fn the_port_passes_packets_on_both_ways_and_ends_a_full_one() {
     let shared = shared();
-    let (_, usb, (mut telemetry, _)) = ends();
+    let Ends { usb, telemetry: (mut telemetry, _), .. } = ends();
     let mut port: Port<Fake> = Port::new(shared, Part, usb);
     let packet = |bytes: &[u8]| Packet::from_slice(bytes).unwrap();
     world().incoming.borrow_mut().push_back([1, 2, 3].into());
@@ -157,7 +157,7 @@ fn the_port_passes_packets_on_both_ways_and_ends_a_full_one() {
 #[test]
 fn a_port_without_room_keeps_its_interrupt_away() {
     let shared = shared();
-    let (_, usb, (mut telemetry, _)) = ends();
+    let Ends { usb, telemetry: (mut telemetry, _), .. } = ends();
     let mut port: Port<Fake> = Port::new(shared, Part, usb);
     world().usb_allowed.set(true);
     for _ in 0..40 {
