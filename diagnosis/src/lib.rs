@@ -86,8 +86,9 @@ pub fn data_faults(rig: &Rig, fit: &[Recording], holdout: &[Recording]) -> Vec<D
 }
 
 /// Reads the files and says what they can and cannot show, a sentence each, before any effect is
-/// looked for: rate, resolution, faults of the log, what cannot be told apart, effects that cannot
-/// show and why, and what to record for them. An error where nothing can be learnt from them.
+/// looked for: rate, resolution, faults of the log, what cannot be distinguished, effects that
+/// cannot show and why, and what to record for them. An error where nothing can be learnt from
+/// them.
 pub fn check(request: &Request) -> Result<Vec<String>, InputError> {
     let (rig, fit, holdout) = read_all(request)?;
     check_recordings(&rig, &fit, &holdout)

@@ -47,7 +47,7 @@ mod tests {
     use crate::scratch::Scratch;
 
     #[test]
-    fn rows_of_several_cases_share_one_header_and_know_what_is_right() {
+    fn rows_share_one_header_and_know_what_is_right() {
         let scratch = Scratch::new().unwrap();
         let dir = &scratch.0;
         std::fs::create_dir_all(dir).unwrap();

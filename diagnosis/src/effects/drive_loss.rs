@@ -1,4 +1,5 @@
-//! A loss in proportion to the drive's own force, as a gear or a screw has: `-fraction·|drive|·sgn(q̇)`.
+//! A loss in proportion to the drive's own force, as a gear or a screw has:
+//! `-fraction·|drive|·sgn(q̇)`.
 
 use super::definition::{Allowed, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Reported, Span};
 use super::law::sign;

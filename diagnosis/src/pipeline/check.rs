@@ -1,5 +1,5 @@
-//! What recordings can and cannot show, known in seconds: everything that is said before an effect
-//! is looked for. Nothing here names or rejects.
+//! A check of recordings in seconds: everything that is said before an effect is looked for.
+//! Nothing here names or rejects.
 
 use super::Progress;
 use super::prepare;
@@ -19,7 +19,7 @@ use crate::validation::residuals::{drive_force, forces};
 /// Correlation of two fitted values from which only their combination shows.
 const ALIKE: f64 = 0.95;
 
-/// What recordings of a rig can and cannot show.
+/// The limits of what recordings of a rig can show.
 pub(crate) struct Check {
     pub(crate) kind: Kind,
     pub(crate) recordings: Vec<Seen>,
@@ -29,7 +29,7 @@ pub(crate) struct Check {
     /// True if the motion shows no inertia.
     pub(crate) is_inertia_hidden: bool,
     pub(crate) excitation: Excitation,
-    /// Pairs of values of the rig that the fitted recordings cannot tell apart, with their
+    /// Pairs of values of the rig that the fitted recordings cannot distinguish, with their
     /// correlation.
     pub(crate) alike: Vec<(&'static str, &'static str, f64)>,
     /// Effects that no such recordings can tell from each other.

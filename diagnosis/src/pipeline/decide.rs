@@ -3,6 +3,7 @@
 
 use super::assess::Assessment;
 use super::contenders::contenders;
+use super::decisive;
 use super::diagnosis::{
     Complete, Diagnosis, FreeForce, JudgedHypothesis, Moved, NamedEffect, Reason, Rigs, Series,
 };
@@ -65,6 +66,11 @@ pub(crate) fn decide(
     let is_open = |(name, _): &(EffectName, NotTested)| effects.iter().all(|one| !one.class.contains(name));
     let untested =
         untested::untested(&prepared.span, &prepared.nominal).into_iter().filter(is_open).collect::<Vec<_>>();
+    let first = effects
+        .first()
+        .and_then(|one| shown.patched.model.effects.iter().find(|effect| effect.name == one.name));
+    let decisive =
+        first.and_then(|effect| decisive::decisive(effect, shown, &assessment.fit, smoothed, estimator));
     let nothing_found = matches!(verdict, Verdict::Unexplained | Verdict::RandomDisturbance);
     Diagnosis::Complete(Box::new(Complete {
         verdict,
@@ -81,6 +87,7 @@ pub(crate) fn decide(
         place: nothing_found.then(|| top_place(smoothed, &named_alone.on_holdout.patched, &maps)),
         free_form: free_form(unnamed, assessment.beside.as_ref()),
         beyond_fitted: known_travel::beyond(smoothed, &shown.patched.model, &prepared.span),
+        decisive,
         evidence: evidence::rows(assessment, rounds, motion.as_ref()),
         simulation: motion,
         simulated,
@@ -109,7 +116,7 @@ fn moved(nominal: &Nominal, fit: &Fit) -> Moved {
 struct Decision<'a> {
     prepared: &'a Prepared,
     assessment: &'a Assessment,
-    /// What the regression proposes.
+    /// The regression's proposals.
     rounds: &'a [Vec<Hypothesis>],
 }
 

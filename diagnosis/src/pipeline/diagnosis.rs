@@ -1,6 +1,7 @@
 //! A finished diagnosis: everything that a report says, and nothing left to fit.
 
-use super::evidence::EvidenceRow;
+use super::decisive::Decisive;
+use super::evidence_table::EvidenceRow;
 use crate::effects::EffectName;
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::io::rig::Rig;
@@ -51,7 +52,8 @@ pub(crate) enum Reason {
     Foreign(Foreign),
     /// A force of any form explains it.
     FreeForm,
-    /// The regression finds an effect that takes this part of the force error, too little for a name.
+    /// The regression finds an effect that takes this part of the force error, too little for a
+    /// name.
     Follows { effect: EffectName, share: f64 },
     /// The residual repeats where the motion does.
     Repeats { correlation: f64 },
@@ -105,6 +107,8 @@ pub(crate) struct Complete {
     /// of them.
     pub(crate) simulated: Vec<Comparison>,
     pub(crate) simulation: Option<Simulation>,
+    /// The residual over the state of the first named effect.
+    pub(crate) decisive: Option<Decisive>,
     /// The evidence for every hypothesis.
     pub(crate) evidence: Vec<EvidenceRow>,
     /// Residuals of every recording, fitted ones first.

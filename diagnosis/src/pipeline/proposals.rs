@@ -1,4 +1,4 @@
-//! What the regression proposes: the rig and the recordings as it reads them, and no opinion.
+//! The regression's proposals: rig and recordings as it reads them, and no opinion.
 
 use super::prepare::Prepared;
 use crate::data_faults::Checked;

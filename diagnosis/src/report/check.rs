@@ -1,4 +1,4 @@
-//! What recordings can and cannot show, in sentences.
+//! A check of recordings in sentences.
 
 use super::{faults, next_experiment, text};
 use crate::pipeline::check::Check;
@@ -42,14 +42,14 @@ pub(crate) fn sentences(check: &Check) -> Vec<String> {
         );
     }
     for (a, b, correlation) in &check.alike {
-        out.push(format!("{a} and {b} cannot be told apart (correlation {correlation:.2})"));
+        out.push(format!("{a} and {b} cannot be distinguished (correlation {correlation:.2})"));
     }
     if check.excitation.is_one_speed() {
         out.push("all motion is at about one speed: nothing that depends on speed can be named".into());
     }
     for [a, b] in &check.twins {
         let (a, b) = (a.in_words(), b.in_words());
-        out.push(format!("{a} and {b} cannot be told apart in such motion"));
+        out.push(format!("{a} and {b} cannot be distinguished in such motion"));
     }
     let unit = check.kind.length();
     for (name, why) in &check.untested {

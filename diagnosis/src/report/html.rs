@@ -4,6 +4,7 @@
 use crate::io::recording::shown_at;
 use crate::io::rig::Kind;
 use crate::io::schema::{Hypothesis, Named, Verdict};
+use crate::report::decisive_plot;
 use crate::report::faults;
 use crate::report::free_form;
 use crate::report::motion_picture;
@@ -28,6 +29,7 @@ pub(crate) fn page(outcome: &Outcome) -> String {
         safe(&r.record_next),
         short_notes(outcome)
     );
+    decisive_plot::draw(&mut out, outcome);
     motion(&mut out, outcome);
     if r.verdict != Verdict::InsufficientExcitation {
         numbers(&mut out, outcome);

@@ -1,6 +1,7 @@
 //! Sentences, pages and files of a finished diagnosis. Nothing here fits.
 
 pub(crate) mod check;
+mod decisive_plot;
 pub mod exports;
 mod faults;
 mod form_in_words;

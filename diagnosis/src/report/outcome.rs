@@ -3,10 +3,11 @@
 use crate::effects::EffectName;
 use crate::io::rig::{Kind, Rig};
 use crate::io::schema::{Both, Contending, FitTable, Hypothesis, Named, Report, Untested, Verdict};
+use crate::pipeline::decisive::Decisive;
 use crate::pipeline::diagnosis::{
     Complete, Contender, Diagnosis, JudgedHypothesis, NamedEffect, Reason, Rigs, Series,
 };
-use crate::pipeline::evidence::{self, EvidenceRow};
+use crate::pipeline::evidence_table::{self, EvidenceRow};
 use crate::report::{free_form, next_experiment, notes, remains, text};
 use crate::selection::free_form::Shape;
 use crate::simulation::comparison::Comparison;
@@ -24,6 +25,8 @@ pub struct Evidence {
     pub maps: Vec<Map>,
     /// The models run forward and compared with the held-out recordings.
     pub simulated: Vec<Comparison>,
+    /// The residual over the state of the first named effect.
+    pub decisive: Option<Decisive>,
     /// The force of any form, where nothing is named.
     pub(crate) form: Option<Shape>,
     /// Rotary or linear.
@@ -54,7 +57,7 @@ pub struct Outcome {
     pub report: Report,
     /// The data that is plotted.
     pub evidence: Evidence,
-    /// What is known of every hypothesis; none where the recordings did not suffice.
+    /// The evidence for every hypothesis; none where the recordings did not suffice.
     pub hypotheses: Vec<EvidenceRow>,
     /// The rig as it was given.
     pub nominal_rig: Rig,
@@ -225,6 +228,7 @@ impl Outcome {
             series: Vec::new(),
             maps: Vec::new(),
             form: None,
+            decisive: None,
             simulated: Vec::new(),
             kind: rig.kind,
             rig: rig.name.clone(),
@@ -245,21 +249,14 @@ impl Outcome {
     }
 
     fn complete(diagnosis: Complete) -> Self {
-        let Rigs { nominal, refit, patched } = diagnosis.rigs;
-        let contending = |(place, one): (usize, &Contender)| Contending {
-            name: one.name,
-            probability: one.probability,
-            rig: contender_file(place, one.name),
-        };
         let contenders = diagnosis.contenders.iter().enumerate().map(contending).collect();
-        let contending_rigs = diagnosis.contenders.into_iter().map(|one| one.rig).collect();
-        let kind = nominal.kind;
+        let kind = diagnosis.rigs.nominal.kind;
         let form = diagnosis.free_form.as_ref().and_then(|force| force.shape.as_ref());
         let form = form.map(|shape| free_form::sentence(shape, kind.length()));
-        let separating_experiment = match diagnosis.verdict {
-            Verdict::InsufficientExcitation => Some(enough(diagnosis.reason.as_ref()).to_owned()),
-            _ => diagnosis.beyond_fitted.map(|beyond| next_experiment::strokes(beyond, kind.length())),
-        };
+        let separating_experiment = separating(&diagnosis, kind);
+        let Rigs { nominal, refit, patched } = diagnosis.rigs;
+        let untested = diagnosis.untested.into_iter();
+        let contending_rigs = diagnosis.contenders.into_iter().map(|one| one.rig).collect();
         let mut report = Report {
             format: 1,
             verdict: diagnosis.verdict,
@@ -276,9 +273,7 @@ impl Outcome {
             noise_floor: diagnosis.noise_floor,
             unexplained_fraction: diagnosis.unexplained_fraction,
             hypotheses: diagnosis.hypotheses.into_iter().map(hypothesis).collect(),
-            untested: diagnosis
-                .untested
-                .into_iter()
+            untested: untested
                 .map(|(name, why)| Untested { name, because: text::not_tested(&why, kind.length()) })
                 .collect(),
             contenders,
@@ -293,6 +288,7 @@ impl Outcome {
         let evidence = Evidence {
             series: diagnosis.series,
             maps: diagnosis.maps,
+            decisive: diagnosis.decisive,
             form: diagnosis.free_form.and_then(|force| force.shape),
             simulated: diagnosis.simulated,
             kind,
@@ -316,7 +312,19 @@ impl Outcome {
     /// The evidence for every hypothesis as CSV, one row each, the first for none: what both
     /// proposers say, in numbers that mean the same on every machine.
     pub fn hypotheses_csv(&self) -> String {
-        evidence::csv(&self.hypotheses)
+        evidence_table::csv(&self.hypotheses)
+    }
+}
+
+fn contending((place, one): (usize, &Contender)) -> Contending {
+    Contending { name: one.name, probability: one.probability, rig: contender_file(place, one.name) }
+}
+
+/// The recording that would decide what these cannot.
+fn separating(diagnosis: &Complete, kind: Kind) -> Option<String> {
+    match diagnosis.verdict {
+        Verdict::InsufficientExcitation => Some(enough(diagnosis.reason.as_ref()).to_owned()),
+        _ => diagnosis.beyond_fitted.map(|beyond| next_experiment::strokes(beyond, kind.length())),
     }
 }
 

@@ -127,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn the_least_share_that_is_named_is_sure_enough_and_a_larger_one_is_surer() {
+    fn the_least_share_is_sure_enough_and_a_larger_one_surer() {
         let at = |share| Material { name: EffectName::QuadraticDrag, share, class: Vec::new() }.confidence();
         assert!(at(NAMED_SHARE) >= NAMED && at(0.5) > at(0.3) && at(0.9) < 1.0);
     }

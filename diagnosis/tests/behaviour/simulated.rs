@@ -317,3 +317,24 @@ fn files_are_written_whole_and_the_patched_rig_reads_back() {
     assert!(!all.any(is_half), "no half-written file stays");
     std::fs::remove_dir_all(&dir).expect("can be removed");
 }
+
+/// The law was fitted to other recordings than those whose points it goes through.
+#[test]
+fn the_decisive_plot_has_the_law_go_through_held_out_points() {
+    for (effect, variable) in [("cogging", "angle"), ("quadratic_drag", "speed")] {
+        let outcome = run(&rig(OFF, OFFSET), &setup(effect));
+        let plot = outcome.evidence.decisive.as_ref().expect("something is named");
+        assert_eq!((plot.name, plot.variable), (outcome.report.effects[0].name, variable), "{effect}");
+        let pairs: Vec<(f64, f64)> = plot
+            .held_out
+            .iter()
+            .zip(&plot.law)
+            .filter_map(|(bin, law)| Some((bin.as_ref()?.mean, (*law)?)))
+            .collect();
+        assert!(pairs.len() > 10, "{effect}: {} bins", pairs.len());
+        let square =
+            |value: fn(&(f64, f64)) -> f64| pairs.iter().map(|pair| value(pair).powi(2)).sum::<f64>();
+        let left = (square(|(mean, law)| mean - law) / square(|(mean, _)| *mean)).sqrt();
+        assert!(left < 0.35, "{effect}: the law is {left} off the points");
+    }
+}

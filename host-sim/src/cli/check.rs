@@ -7,8 +7,8 @@ use live::{examples, say};
 use std::path::PathBuf;
 
 /// See in seconds what a rig's recordings can and cannot show: rate, resolution, faults of the log,
-/// values and effects that cannot be told apart, effects that cannot show, and what to record for
-/// them.
+/// values and effects that cannot be distinguished, effects that cannot show, and what to record
+/// for them.
 #[derive(Args)]
 #[command(after_help = examples!("Example:
   host-sim check --rig rig.toml --fit fit.csv --holdout holdout.csv"))]

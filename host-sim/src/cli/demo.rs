@@ -43,7 +43,7 @@ impl Which {
 #[derive(Args)]
 #[command(after_help = examples!("Example: host-sim demo cannot-tell --no-open"))]
 pub(crate) struct Demo {
-    /// What the recordings show
+    /// The recordings to diagnose
     #[arg(value_enum, default_value = "missing")]
     which: Which,
     /// Folder for the recordings and the report

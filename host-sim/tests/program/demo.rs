@@ -33,7 +33,7 @@ fn a_demonstration_finds_the_cogging_that_its_rotor_has() {
 }
 
 #[test]
-fn a_demonstration_at_one_speed_cannot_tell_and_says_what_to_record() {
+fn at_one_speed_a_demonstration_cannot_tell() {
     let (said, report) = report("cannot-tell");
     assert_eq!(report["verdict"], "insufficient_excitation", "{said}");
     assert!(report["effects"].as_array().expect("effects").is_empty());
@@ -68,6 +68,6 @@ fn a_check_says_in_seconds_what_the_recordings_cannot_show() {
     assert!(lively.contains("fit-a.csv: 8 s at 250 rows a second"), "{lively}");
     assert!(!lively.contains("about one speed"), "{lively}");
     let steady = check("cannot-tell");
-    assert!(steady.contains("viscous friction and dry friction cannot be told apart"), "{steady}");
+    assert!(steady.contains("viscous friction and dry friction cannot be distinguished"), "{steady}");
     assert!(steady.contains("about one speed") && steady.contains("record next: a staircase"), "{steady}");
 }

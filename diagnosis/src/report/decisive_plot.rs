@@ -1,0 +1,65 @@
+//! The decisive plot, on top of the page.
+
+use crate::pipeline::decisive::{Bin, Decisive};
+use crate::report::outcome::Outcome;
+use html_report::drawing::path;
+use html_report::plot::{close, frame};
+use html_report::safe;
+use numerics::digits::short;
+use std::fmt::Write as _;
+
+/// Draws what the refitted simulation leaves over the state of the first named law; nothing where
+/// nothing is named.
+pub(super) fn draw(out: &mut String, outcome: &Outcome) {
+    let Some(plot) = &outcome.evidence.decisive else { return };
+    let unit = &outcome.report.fit.unit;
+    let what = plot.name.in_words();
+    let _ = write!(
+        out,
+        "<section><h2>What shows it</h2><p class=note>The force that the simulation leaves after its values were refitted, by {}: \
+         <span><i class=\"key a\"></i> fitted</span> <span><i class=\"key c\"></i> held out</span>, mean and standard deviation. \
+         <span><i class=\"key law\"></i> what {} takes of it.</span></p>",
+        plot.variable,
+        safe(what)
+    );
+    let ends = plot.fitted.iter().chain(&plot.held_out).flatten();
+    let top = ends.map(|bin| bin.mean.abs() + bin.spread).fold(1e-300_f64, f64::max);
+    let (low, high) = (plot.at[0], plot.at[plot.at.len() - 1]);
+    let label = axis(plot, outcome.evidence.kind.length());
+    let at = frame(out, (low, high), (-top, top), &label, &format!("residual force, {unit}"));
+    let aside = 0.12 * (high - low) / plot.at.len() as f64;
+    for (class, name, bins, aside) in
+        [("a", "fitted", &plot.fitted, -aside), ("c", "held out", &plot.held_out, aside)]
+    {
+        let _ = write!(out, "<path class=\"bins {class}\" data-name=\"{name}\" d=\"");
+        for (x, bin) in plot.at.iter().zip(bins) {
+            if let Some(bin) = bin {
+                mark(out, &at, x + aside, *bin);
+            }
+        }
+        out.push_str("\"/>");
+    }
+    let _ = write!(out, "<path class=\"line law\" data-name=\"{}\" d=\"", safe(what));
+    path(out, plot.law.iter().zip(&plot.at).map(|(law, x)| law.map(|law| at(*x, law))));
+    out.push_str("\"/>");
+    close(out, &label);
+    out.push_str("</section>");
+}
+
+/// A bar from one standard deviation below the mean to one above, with a tick at the mean.
+fn mark(out: &mut String, at: &impl Fn(f64, f64) -> (f64, f64), x: f64, bin: Bin) {
+    let (x, mean) = at(x, bin.mean);
+    let [low, high] = [-bin.spread, bin.spread].map(|by| at(0.0, bin.mean + by).1);
+    let _ = write!(out, "M{x:.1} {low:.1}V{high:.1}M{:.1} {mean:.1}H{:.1}", x - 3.0, x + 3.0);
+}
+
+fn axis(plot: &Decisive, length: &str) -> String {
+    match (plot.variable, plot.period) {
+        ("angle", Some(period)) => format!("angle within {} {length}, {length}", short(period)),
+        ("speed", _) => format!("speed, {length}/s"),
+        ("time", _) => "time, s".to_owned(),
+        ("command", _) => "command".to_owned(),
+        ("tilt", _) => "tilt, rad".to_owned(),
+        (variable, _) => format!("{variable}, {length}"),
+    }
+}
