@@ -58,9 +58,10 @@ pub(crate) fn decisive(
     let rows = |tracks: &[BlockedRecording], of: &crate::validation::residuals::Residuals| -> Vec<Row> {
         let one = |(r, track): (usize, &BlockedRecording)| -> Vec<Row> {
             let moving = estimator.moving(track);
-            let state = state(track, variable, period);
+            let state = state(track, variable);
             let row = |j: usize| (state[j], of.refit[r][j], of.refit[r][j] - of.patched[r][j]);
-            (0..state.len()).filter(|j| moving[*j]).map(row).collect()
+            let rows: Vec<Row> = (0..state.len()).filter(|j| moving[*j]).map(row).collect();
+            period.map_or_else(|| rows.clone(), |period| in_phase(&rows, period))
         };
         tracks.iter().enumerate().flat_map(one).collect()
     };
@@ -98,12 +99,20 @@ fn bin(values: &[f64]) -> Option<Bin> {
     (values.len() >= FEWEST).then_some(Bin { mean, spread })
 }
 
+/// The rows of one recording within one period from where the law rises through zero: counts of an
+/// encoder that is not absolute begin anywhere, so that each recording has a phase of its own.
+fn in_phase(rows: &[Row], period: f64) -> Vec<Row> {
+    let turn = std::f64::consts::TAU / period;
+    let sum = |wave: fn(f64) -> f64| rows.iter().map(|row| row.2 * wave(turn * row.0)).sum::<f64>();
+    let early = sum(f64::cos).atan2(sum(f64::sin)) / turn;
+    rows.iter().map(|(x, left, law)| ((x + early).rem_euclid(period), *left, *law)).collect()
+}
+
 /// A variable block by block; speeds with their sign, as friction has one.
-fn state(track: &BlockedRecording, variable: &str, period: Option<f64>) -> Vec<f64> {
+fn state(track: &BlockedRecording, variable: &str) -> Vec<f64> {
     match variable {
         "command" => track.block_mean(&track.rows.command),
-        "travel" => track.places().collect(),
-        "angle" => track.places().map(|x| period.map_or(x, |period| x.rem_euclid(period))).collect(),
+        "travel" | "angle" => track.places().collect(),
         "time" => track.blocks.start.clone(),
         "tilt" => track.blocks.tilt.clone().unwrap_or_else(|| vec![0.0; track.block_count()]),
         _ => track.motion.v.clone(),

@@ -55,7 +55,7 @@ fn mark(out: &mut String, at: &impl Fn(f64, f64) -> (f64, f64), x: f64, bin: Bin
 
 fn axis(plot: &Decisive, length: &str) -> String {
     match (plot.variable, plot.period) {
-        ("angle", Some(period)) => format!("angle within {} {length}, {length}", short(period)),
+        ("angle", Some(period)) => format!("angle within a period of {} {length}, {length}", short(period)),
         ("speed", _) => format!("speed, {length}/s"),
         ("time", _) => "time, s".to_owned(),
         ("command", _) => "command".to_owned(),
