@@ -54,12 +54,14 @@ fn mark(out: &mut String, at: &impl Fn(f64, f64) -> (f64, f64), x: f64, bin: Bin
 }
 
 fn axis(plot: &Decisive, length: &str) -> String {
-    match (plot.variable, plot.period) {
-        ("angle", Some(period)) => format!("angle within a period of {} {length}, {length}", short(period)),
-        ("speed", _) => format!("speed, {length}/s"),
-        ("time", _) => "time, s".to_owned(),
-        ("command", _) => "command".to_owned(),
-        ("tilt", _) => "tilt, rad".to_owned(),
-        (variable, _) => format!("{variable}, {length}"),
+    if let Some(period) = plot.period {
+        return format!("angle within a period of {} {length}, {length}", short(period));
+    }
+    match plot.variable {
+        "speed" => format!("speed, {length}/s"),
+        "time" => "time, s".to_owned(),
+        "command" => "command".to_owned(),
+        "tilt" => "tilt, rad".to_owned(),
+        other => format!("{other}, {length}"),
     }
 }
