@@ -1,5 +1,5 @@
 //! A trainee's figures, insertion by insertion: time, path, force, punctures, the vessel, angle,
-//! smoothness. [`gesture`] is the movement, [`course`] what it entered, [`smoothness`] a measure of
+//! smoothness. [`gesture`] is the movement, `course` what it entered, [`smoothness`] a measure of
 //! any movement; here they are put together, with the verdict.
 
 pub(crate) mod course;
@@ -213,7 +213,7 @@ impl Judge {
 
     /// The attempts of a stretch, and whether each has ended. Where the goal begins with a task,
     /// the needle may leave the skin and pierce it again in one attempt: until it has come into the
-    /// vein, the task is done anew, or [`AGAIN_TICKS`] have passed.
+    /// vein, the task is done anew, or `AGAIN_TICKS` have passed.
     pub fn spans<'a>(&self, stretch: &'a Stretch) -> Vec<(Span<'a>, bool)> {
         let mut attempts: Vec<(u64, u64, bool)> = Vec::new();
         let now = stretch.end_tick();
