@@ -93,6 +93,12 @@ impl LiveScore {
         self.judge.as_ref().map(|judge| verdict::open(judge.aim()))
     }
 
+    /// True if an insertion has begun and not ended.
+    pub(crate) fn is_going_on(&self) -> bool {
+        let (Some(stretch), Some(judge)) = (&self.stretch, &self.judge) else { return false };
+        judge.spans(stretch).pop().is_some_and(|(_, has_ended)| !has_ended)
+    }
+
     /// Returns the verdict so far on the attempt that is going on, or is to come.
     pub(crate) fn so_far(&self) -> Option<Verdict> {
         let (stretch, judge) = (self.stretch.as_ref()?, self.judge.as_ref()?);

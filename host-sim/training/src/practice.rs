@@ -74,10 +74,11 @@ impl Practice {
         self.so_far = None;
     }
 
-    /// Notes who holds the needle.
+    /// Notes who holds the needle. What a person takes over before it has begun is the person's.
     pub fn held(&mut self, by_person: bool) {
+        let is_new = by_person && !self.by_person && !self.live.is_going_on();
+        self.was_scripted = !by_person || self.was_scripted && !is_new;
         self.by_person = by_person;
-        self.was_scripted |= !by_person;
     }
 
     /// Judges what has ended since the last time, and says how the present attempt goes.
