@@ -20,6 +20,11 @@ use regression::Hypothesis;
 pub(crate) fn by_regression(prepared: &Prepared, found: &Found, rounds: &[Vec<Hypothesis>]) -> Option<Found> {
     let context = prepared.context(&prepared.fit);
     let mut model = context.fit(Model::default(), &prepared.noise, Colour::White);
+    if prepared.nominal.one_way {
+        // Where an axis moves one way its dry friction is the offset that the regression gives each
+        // recording, and never among its laws.
+        model = with_effect(&context, &model, EffectName::CoulombFriction).unwrap_or(model);
+    }
     let shown = shown(prepared, found);
     let mut materials = Vec::new();
     for mut material in material::named(rounds) {

@@ -9,10 +9,9 @@ use regression::{Hypothesis, Part, Value};
 
 /// The rounds of the regression, each with the best of every law, the chosen one first; none where
 /// the recordings are too short for it. A rig that holds effects already is not the regression's:
-/// it knows the nominal structure alone. Nor is an axis that moves one way only: a constant force
-/// is its dry friction, and each recording has an offset of its own there.
+/// it knows the nominal structure alone.
 pub(crate) fn propose(prepared: &Prepared, checked: &Checked) -> Vec<Vec<Hypothesis>> {
-    if !prepared.given.effects.is_empty() || prepared.nominal.one_way {
+    if !prepared.given.effects.is_empty() {
         return Vec::new();
     }
     let late_s = prepared.nominal.skew_rows.map_or(0.0, |rows| rows * skew::row_s(&prepared.fit[0]));
