@@ -2,7 +2,7 @@
 
 use super::prepare::Prepared;
 use super::search::{Found, in_its_own_motion};
-use crate::effects::definition::Shown;
+use crate::effects::definition::{NominalTerm, Shown};
 use crate::effects::{Effect, EffectName};
 use crate::estimation::model::Model;
 use crate::estimation::noise::Colour;
@@ -23,7 +23,9 @@ pub(crate) fn by_regression(prepared: &Prepared, found: &Found, rounds: &[Vec<Hy
     if prepared.nominal.one_way {
         // Where an axis moves one way its dry friction is the offset that the regression gives each
         // recording, and never among its laws.
-        model = with_effect(&context, &model, EffectName::CoulombFriction).unwrap_or(model);
+        let is_dry = |name: &&EffectName| name.definition().nominal_term() == Some(NominalTerm::Coulomb);
+        let dry = EffectName::ALL.iter().find(is_dry);
+        model = dry.and_then(|name| with_effect(&context, &model, *name)).unwrap_or(model);
     }
     let shown = shown(prepared, found);
     let mut materials = Vec::new();
