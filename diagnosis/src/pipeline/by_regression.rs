@@ -2,13 +2,11 @@
 
 use super::prepare::Prepared;
 use super::search::{Found, in_its_own_motion};
-use crate::effects::definition::{NominalTerm, Shown};
+use crate::effects::definition::NominalTerm;
 use crate::effects::{Effect, EffectName};
 use crate::estimation::model::Model;
 use crate::estimation::noise::Colour;
-use crate::io::rig::Kind;
 use crate::selection::context::{FitContext, FittedModel};
-use crate::selection::excitation::Excitation;
 use crate::thresholds::MOST_IN_CLASS;
 use crate::validation::effect_evidence::gather_evidence;
 use crate::validation::elimination::StandingModel;
@@ -27,7 +25,7 @@ pub(crate) fn by_regression(prepared: &Prepared, found: &Found, rounds: &[Vec<Hy
         let dry = EffectName::ALL.iter().find(is_dry);
         model = dry.and_then(|name| with_effect(&context, &model, *name)).unwrap_or(model);
     }
-    let shown = shown(prepared, found);
+    let shown = prepared.shown(&found.fit);
     let mut materials = Vec::new();
     for mut material in material::named(rounds) {
         // The regression may not tell its name from one that the filter can fit.
@@ -49,13 +47,6 @@ fn with_effect(context: &FitContext, now: &FittedModel, name: EffectName) -> Opt
     let mut finalists = context.finalists(now, &best);
     context.polish(&mut finalists);
     finalists.into_iter().next()
-}
-
-/// Returns the facts about the axis that the recordings show.
-fn shown(prepared: &Prepared, found: &Found) -> Shown {
-    let (count, rig) = (prepared.span.count, &prepared.nominal.rig);
-    let excitation = Excitation::of(&found.fit, count, rig.turn()).shown();
-    Shown { one_way: prepared.span.one_way, linear: rig.kind == Kind::Linear, count, ..excitation }
 }
 
 /// A class that begins with a name of it, followed by the effects that no such recordings

@@ -4,6 +4,7 @@
 use super::Progress;
 use super::prepare;
 use crate::data_faults::Checked;
+use crate::effects::definition::Shown;
 use crate::effects::{Effect, EffectName};
 use crate::estimation::fit::Fit;
 use crate::estimation::force_residual::Estimator;
@@ -77,7 +78,7 @@ pub(crate) fn check(rig: &Rig, checked: &Checked, progress: Progress) -> Check {
             || prepared.nominal.virtual_inertia > 0.0,
         excitation,
         alike: alike(&fit),
-        twins: twins(&excitation, checked.is_one_way, &untested),
+        twins: twins(&prepared.shown(&prepared.fit), &untested),
         untested,
         left: left / force,
         noise: noise / force,
@@ -126,17 +127,12 @@ fn alike(fit: &Fit) -> Vec<(&'static str, &'static str, f64)> {
 }
 
 /// Effects that are tested and have the same shape in all such motion.
-fn twins(
-    excitation: &Excitation,
-    one_way: bool,
-    untested: &[(EffectName, NotTested)],
-) -> Vec<[EffectName; 2]> {
-    let shown = crate::effects::definition::Shown { one_way, ..excitation.shown() };
+fn twins(shown: &Shown, untested: &[(EffectName, NotTested)]) -> Vec<[EffectName; 2]> {
     let is_tested =
         |name: &EffectName| name.definition().is_sought() && untested.iter().all(|(other, _)| other != name);
     let mut pairs: Vec<[EffectName; 2]> = Vec::new();
     for name in EffectName::ALL.iter().filter(|name| is_tested(name)) {
-        for other in name.definition().twins(&Effect::shaped(*name, &[]), &shown) {
+        for other in name.definition().twins(&Effect::shaped(*name, &[]), shown) {
             let pair = [*name.min(&other), *name.max(&other)];
             if is_tested(&other) && !pairs.contains(&pair) {
                 pairs.push(pair);

@@ -5,6 +5,8 @@ use crate::effects::{Effect, EffectName};
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::force_residual::Estimator;
 use crate::validation::comparison::Shown;
+use crate::validation::residual_maps::variable as variable_of;
+use crate::validation::residuals::Residuals;
 
 /// Bins over the state.
 const BINS: usize = 32;
@@ -44,7 +46,8 @@ pub struct Decisive {
 /// One block: the state, what the refit leaves, and what the laws take of that.
 type Row = (f64, f64, f64);
 
-/// The picture for an effect of a shown model; none where too little moves.
+/// The picture for an effect of a shown model; none where too little moves, or where the state says
+/// less than half of what the laws take: a delay shows over no state.
 pub(crate) fn decisive(
     effect: &Effect,
     shown: &Shown,
@@ -55,10 +58,10 @@ pub(crate) fn decisive(
     let variable = effect.name.definition().variable();
     let slowest = effect.waves().first().map(|(_, waves)| std::f64::consts::TAU / waves.abs());
     let period = slowest.filter(|period| variable == "angle" && period.is_finite());
-    let rows = |tracks: &[BlockedRecording], of: &crate::validation::residuals::Residuals| -> Vec<Row> {
+    let rows = |tracks: &[BlockedRecording], of: &Residuals| -> Vec<Row> {
         let one = |(r, track): (usize, &BlockedRecording)| -> Vec<Row> {
             let moving = estimator.moving(track);
-            let state = state(track, variable);
+            let state = variable_of(track, variable, period);
             let row = |j: usize| (state[j], of.refit[r][j], of.refit[r][j] - of.patched[r][j]);
             let rows: Vec<Row> = (0..state.len()).filter(|j| moving[*j]).map(row).collect();
             period.map_or_else(|| rows.clone(), |period| in_phase(&rows, period))
@@ -74,19 +77,25 @@ pub(crate) fn decisive(
         return None;
     }
     let width = (high - low) / BINS as f64;
+    let place = |row: &Row| (((row.0 - low) / width) as usize).min(BINS - 1);
     let bins = |rows: &[Row], value: fn(&Row) -> f64| -> Vec<Option<Bin>> {
         let mut inside = vec![Vec::new(); BINS];
         for row in rows.iter().filter(|row| (low..high).contains(&row.0)) {
-            inside[(((row.0 - low) / width) as usize).min(BINS - 1)].push(value(row));
+            inside[place(row)].push(value(row));
         }
         inside.iter().map(|values| bin(values)).collect()
     };
-    Some(Decisive {
+    let law: Vec<Option<f64>> =
+        bins(&fitted, |row| row.2).into_iter().map(|bin| bin.map(|bin| bin.mean)).collect();
+    let unsaid = |row: &Row| row.2 - law[place(row)].unwrap_or(0.0);
+    let square = |of: &dyn Fn(&Row) -> f64| fitted.iter().map(|row| of(row).powi(2)).sum::<f64>();
+    let is_seen = square(&unsaid) < 0.5 * square(&|row| row.2);
+    is_seen.then(|| Decisive {
         name: effect.name,
         variable,
         period,
         at: (0..BINS).map(|i| low + (i as f64 + 0.5) * width).collect(),
-        law: bins(&fitted, |row| row.2).into_iter().map(|bin| bin.map(|bin| bin.mean)).collect(),
+        law,
         fitted: bins(&fitted, |row| row.1),
         held_out: bins(&held_out, |row| row.1),
     })
@@ -106,15 +115,4 @@ fn in_phase(rows: &[Row], period: f64) -> Vec<Row> {
     let sum = |wave: fn(f64) -> f64| rows.iter().map(|row| row.2 * wave(turn * row.0)).sum::<f64>();
     let early = sum(f64::cos).atan2(sum(f64::sin)) / turn;
     rows.iter().map(|(x, left, law)| ((x + early).rem_euclid(period), *left, *law)).collect()
-}
-
-/// A variable block by block; speeds with their sign, as friction has one.
-fn state(track: &BlockedRecording, variable: &str) -> Vec<f64> {
-    match variable {
-        "command" => track.block_mean(&track.rows.command),
-        "travel" | "angle" => track.places().collect(),
-        "time" => track.blocks.start.clone(),
-        "tilt" => track.blocks.tilt.clone().unwrap_or_else(|| vec![0.0; track.block_count()]),
-        _ => track.motion.v.clone(),
-    }
 }

@@ -42,8 +42,8 @@ use search::Found;
 /// A callback that receives the stage and the fraction done.
 pub(crate) type Progress<'a> = &'a (dyn Fn(&str, f64) + Sync);
 
-/// Why nothing can be learnt from recordings: a sentence of a recording that cannot be used at all,
-/// or of too little motion.
+/// The reason why nothing can be learnt from recordings: one of them cannot be used at all, or they
+/// show too little.
 enum Unusable {
     Refused(String),
     TooLittle(String),
@@ -132,7 +132,7 @@ fn is_taken(by_regression: &Assessment, by_filter: &Assessment) -> bool {
         above_noise(table.patched.fit) / above_noise(table.refit.fit).max(1e-300)
     };
     match &by_filter.foreign {
-        // Sure physics without a name needs to leave no less than a name.
+        // Physics without a name that is sure is kept where it leaves as little.
         Some(foreign) => 1.0 - foreign.share >= left(by_regression),
         None if by_filter.weighed.named().is_empty() => true,
         None => left(by_filter) >= CLEARLY_LESS.powi(2) * left(by_regression),

@@ -142,15 +142,12 @@ pub(crate) fn place(nominal: &Nominal, fit: &[BlockedRecording], last: &FittedMo
     place
 }
 
-/// Returns a variable of a recording, block by block; without its sign where an effect depends on
-/// its size.
+/// Returns a state of a recording, block by block; without its sign where an effect depends on its
+/// size.
 fn states(variable: &str, track: &BlockedRecording, turn: Option<f64>) -> Vec<f64> {
-    match variable {
-        "command" => track.block_mean(&track.rows.command).iter().map(|u| u.abs()).collect(),
-        "travel" => track.places().collect(),
-        "angle" => track.places().map(|x| turn.map_or(x, |turn| x.rem_euclid(turn))).collect(),
-        "time" => track.blocks.start.clone(),
-        "tilt" => track.blocks.tilt.clone().unwrap_or_default(),
-        _ => track.motion.v.iter().map(|v| v.abs()).collect(),
+    let mut states = residual_maps::variable(track, variable, turn);
+    if !matches!(variable, "travel" | "angle" | "time" | "tilt") {
+        states.iter_mut().for_each(|x| *x = x.abs());
     }
+    states
 }

@@ -3,7 +3,7 @@
 
 use super::Progress;
 use crate::data_faults::Checked;
-use crate::effects::definition::Span;
+use crate::effects::definition::{Shown, Span};
 use crate::effects::{Effect, EffectName};
 use crate::estimation::blocked_recording::{BlockedRecording, Jumps};
 use crate::estimation::filter::Noise;
@@ -15,9 +15,10 @@ use crate::estimation::noise::{self, Colour};
 use crate::estimation::nominal::Nominal;
 use crate::estimation::{quasi_static, refit, skew};
 use crate::io::recording::Recording;
-use crate::io::rig::Rig;
+use crate::io::rig::{Kind, Rig};
 use crate::selection::candidates::span_of;
 use crate::selection::context::{FitContext, FittedModel};
+use crate::selection::excitation::Excitation;
 use crate::validation::holdout_set::HoldoutSet;
 use crate::validation::residuals::{drive_force, forces};
 
@@ -41,6 +42,13 @@ impl Prepared {
     /// Returns the context of a search over recordings in some motion.
     pub(crate) fn context<'a>(&'a self, tracks: &'a [BlockedRecording]) -> FitContext<'a> {
         FitContext { nominal: &self.nominal, tracks, span: &self.span, scale: self.scale }
+    }
+
+    /// The facts about the axis that recordings in some motion show.
+    pub(crate) fn shown(&self, tracks: &[BlockedRecording]) -> Shown {
+        let (count, rig) = (self.span.count, &self.nominal.rig);
+        let excitation = Excitation::of(tracks, count, rig.turn()).shown();
+        Shown { one_way: self.span.one_way, linear: rig.kind == Kind::Linear, count, ..excitation }
     }
 }
 

@@ -8,8 +8,8 @@ use crate::io::rig::{Kind, Rig};
 use regression::{Hypothesis, Part, Value};
 
 /// The rounds of the regression, each with the best of every law, the chosen one first; none where
-/// the recordings are too short for it. A rig that holds effects already is not the regression's:
-/// it knows the nominal structure alone.
+/// the recordings are too short for it, or where the rig holds effects already: the regression
+/// knows the nominal structure alone.
 pub(crate) fn propose(prepared: &Prepared, checked: &Checked) -> Vec<Vec<Hypothesis>> {
     if !prepared.given.effects.is_empty() {
         return Vec::new();

@@ -16,7 +16,7 @@ pub(super) fn draw(out: &mut String, outcome: &Outcome) {
     let what = plot.name.in_words();
     let _ = write!(
         out,
-        "<section><h2>What shows it</h2><p class=note>The force that the simulation leaves after its values were refitted, by {}: \
+        "<section><h2>The force that was left out</h2><p class=note>The force that the simulation leaves after its values were refitted, by {}: \
          <span><i class=\"key a\"></i> fitted</span> <span><i class=\"key c\"></i> held out</span>, mean and standard deviation. \
          <span><i class=\"key law\"></i> what {} takes of it.</span></p>",
         plot.variable,

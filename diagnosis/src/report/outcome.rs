@@ -234,18 +234,9 @@ impl Outcome {
             rig: rig.name.clone(),
             rate_hz,
         };
-        let [nominal_rig, refit_rig, patched_rig] = [rig.clone(), rig.clone(), rig.clone()];
-        let (contending_rigs, hypotheses) = (Vec::new(), Vec::new());
-        Self {
-            report,
-            evidence,
-            hypotheses,
-            nominal_rig,
-            refit_rig,
-            patched_rig,
-            contending_rigs,
-            made: None,
-        }
+        let nominal = || rig.clone();
+        let rigs = Rigs { nominal: nominal(), refit: nominal(), patched: nominal() };
+        Self::with_rigs(report, evidence, rigs)
     }
 
     fn complete(diagnosis: Complete) -> Self {
@@ -295,17 +286,20 @@ impl Outcome {
             rig: nominal.name.clone(),
             rate_hz: diagnosis.rate_hz,
         };
-        let [nominal_rig, refit_rig, patched_rig] = [nominal, refit, patched];
-        let hypotheses = diagnosis.evidence;
+        let rigs = Rigs { nominal, refit, patched };
+        Self { hypotheses: diagnosis.evidence, contending_rigs, ..Self::with_rigs(report, evidence, rigs) }
+    }
+
+    fn with_rigs(report: Report, evidence: Evidence, rigs: Rigs) -> Self {
         Self {
+            made: None,
             report,
             evidence,
-            hypotheses,
-            nominal_rig,
-            refit_rig,
-            patched_rig,
-            contending_rigs,
-            made: None,
+            hypotheses: Vec::new(),
+            nominal_rig: rigs.nominal,
+            refit_rig: rigs.refit,
+            patched_rig: rigs.patched,
+            contending_rigs: Vec::new(),
         }
     }
 

@@ -24,12 +24,14 @@ pub struct Map {
 const BINS: usize = 14;
 const LEAST: usize = 20;
 
-fn variable(track: &BlockedRecording, name: &str, turn: Option<f64>) -> Vec<f64> {
+/// A state block by block by its name; an angle within a turn where that is known.
+pub(crate) fn variable(track: &BlockedRecording, name: &str, turn: Option<f64>) -> Vec<f64> {
     match name {
         "speed" => track.motion.v.clone(),
         "travel" => track.places().collect(),
-        "angle" => track.places().map(|x| turn.map_or(0.0, |turn| x.rem_euclid(turn))).collect(),
+        "angle" => track.places().map(|x| turn.map_or(x, |turn| x.rem_euclid(turn))).collect(),
         "command" => track.block_mean(&track.rows.command),
+        "tilt" => track.blocks.tilt.clone().unwrap_or_else(|| vec![0.0; track.block_count()]),
         _ => track.blocks.start.clone(),
     }
 }

@@ -337,4 +337,7 @@ fn the_decisive_plot_has_the_law_go_through_held_out_points() {
         let left = (square(|(mean, law)| mean - law) / square(|(mean, _)| *mean)).sqrt();
         assert!(left < 0.35, "{effect}: the law is {left} off the points");
     }
+    let delay = run(&rig(OFF, OFFSET), &setup("command_delay"));
+    assert_eq!(delay.report.effects[0].name.as_str(), "command_delay");
+    assert!(delay.evidence.decisive.is_none(), "a delay shows over no state");
 }

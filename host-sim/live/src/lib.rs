@@ -55,7 +55,7 @@ pub struct Options {
     /// Print each stage with its time to standard error, also where that is no terminal
     #[arg(long, short, global = true, conflicts_with = "quiet")]
     verbose: bool,
-    /// Do not open a browser when serving a page
+    /// Do not open a browser
     #[arg(long, global = true)]
     no_browser: bool,
 }

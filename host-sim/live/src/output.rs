@@ -38,7 +38,7 @@ fn takes_colours() -> bool {
 /// Says where a page is, and opens it where this program does so.
 pub fn page(what: &str, url: &str) {
     note!("{what} at {url}");
-    if OPENS_BROWSER && !NO_BROWSER.load(Ordering::Relaxed) {
+    if OPENS_BROWSER {
         open(url);
     }
 }
@@ -60,9 +60,12 @@ pub(crate) fn page_for_others(url: &str) {
     }
 }
 
-/// Asks the system for its browser, to show an address or a file. If the system has no browser, the
-/// printed address remains.
+/// Asks the system for its browser, to show an address or a file, unless the command line says
+/// `--no-browser`. If the system has no browser, the printed address remains.
 pub fn open(url: &str) {
+    if NO_BROWSER.load(Ordering::Relaxed) {
+        return;
+    }
     let mut command = if cfg!(target_os = "windows") {
         let mut command = Command::new("rundll32");
         command.arg("url.dll,FileProtocolHandler");

@@ -41,7 +41,7 @@ impl Which {
 ///
 /// The recordings are of a simulated rotor that shares no code with this program.
 #[derive(Args)]
-#[command(after_help = examples!("Example: host-sim demo cannot-tell --no-open"))]
+#[command(after_help = examples!("Example: host-sim demo cannot-tell --no-browser"))]
 pub(crate) struct Demo {
     /// The recordings to diagnose
     #[arg(value_enum, default_value = "missing")]
@@ -49,9 +49,6 @@ pub(crate) struct Demo {
     /// Folder for the recordings and the report
     #[arg(long, value_name = "DIR", default_value = "host-sim-demo")]
     out: PathBuf,
-    /// Leave the report unopened
-    #[arg(long)]
-    no_open: bool,
 }
 
 impl Demo {
@@ -88,9 +85,7 @@ impl Demo {
         note!(
             "with files of your own: host-sim diagnose --rig rig.toml --fit a.csv --holdout b.csv --out DIR"
         );
-        if !self.no_open {
-            live::output::open(&shown("report.html"));
-        }
+        live::output::open(&shown("report.html"));
         Ok(())
     }
 }

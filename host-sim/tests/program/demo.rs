@@ -13,7 +13,7 @@ fn top() -> PathBuf {
 
 fn report(which: &str) -> (String, Value) {
     let out = folder(&format!("demo-{which}"));
-    let said = run_well(&["demo", which, "--no-open", "--out", text(&out)]);
+    let said = run_well(&["demo", which, "--no-browser", "--out", text(&out)]);
     assert!(out.join(which).join("report.html").is_file());
     let json = std::fs::read_to_string(out.join(which).join("diagnosis.json")).expect("it was written");
     (said, serde_json::from_str(&json).expect("it is JSON"))
