@@ -156,7 +156,8 @@ pub(crate) const SUREST_BESIDE_PHYSICS: f64 = 0.8;
 pub(crate) const NAMED_SHARE: f64 = 0.15;
 pub(crate) const TAKEN_Z: f64 = 1.0;
 pub(crate) const SIZES_AGREE: f64 = 0.4;
-/// Part of the force error from which a mismatch is called no random one: a tenth of its square.
+/// Part of the force error from which a mismatch is called no random one, and from which the filter
+/// looks for a law of the command: a tenth of its square.
 pub(crate) const FOLLOWS_SHARE: f64 = 0.05;
 /// Part of its share that a rival must take, and standard errors by which it must be behind at
 /// most, to join its class. The same rule.

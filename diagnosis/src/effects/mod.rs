@@ -90,6 +90,7 @@ registry! {
     TorqueRipple torque_ripple;
     CommandDeadband command_deadband;
     CommandSaturation command_saturation;
+    SupplyLimit supply_limit;
     CommandDelay command_delay;
     ElectricalLag electrical_lag;
     GainDrift gain_drift;

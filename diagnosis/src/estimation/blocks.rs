@@ -164,7 +164,7 @@ impl Rows {
 /// The command behind the delay and the lag that the rig already knows.
 fn as_known(rig: &Rig, command: impl Iterator<Item = f64>, hold: &[f64]) -> Vec<f64> {
     let mut laws = rig.known_command_laws();
-    command.zip(hold).map(|(u, h)| laws.iter_mut().fold(u, |u, law| law.step(u, *h))).collect()
+    command.zip(hold).map(|(u, h)| laws.iter_mut().fold(u, |u, law| law.step(u, 0.0, *h))).collect()
 }
 
 impl Blocks {

@@ -20,8 +20,12 @@ pub(crate) fn effective_command(track: &BlockedRecording, effects: &[Effect]) ->
     if let [CommandLaw::Delay { delay, .. }] = laws.as_slice() {
         return Some(delayed(&track.rows.command, &track.rows.hold, *delay));
     }
-    let holdout = track.rows.command.iter().zip(track.rows.hold.iter());
-    Some(holdout.map(|(u, h)| laws.iter_mut().fold(*u, |u, law| law.step(u, *h))).collect())
+    let velocity = |row: usize| track.motion.v.get(row / track.rows.per_block).copied().unwrap_or(0.0);
+    let rows = track.rows.command.iter().zip(track.rows.hold.iter()).enumerate();
+    let effective = |(row, (u, h)): (usize, (&f64, &f64))| {
+        laws.iter_mut().fold(*u, |u, law| law.step(u, velocity(row), *h))
+    };
+    Some(rows.map(effective).collect())
 }
 
 /// Mean over each row of commands that arrive late, as [`CommandLaw::Delay`] makes it: differences
@@ -64,7 +68,7 @@ mod tests {
             let effect = Effect::shaped(EffectName::CommandDelay, &[("delay", delay)]);
             let mut law = CommandLaw::new(&effect).expect("a delay acts on the command");
             for (now, (u, h)) in delayed(&command, &hold, delay).iter().zip(command.iter().zip(&hold)) {
-                let expected = law.step(*u, *h);
+                let expected = law.step(*u, 0.0, *h);
                 assert!((now - expected).abs() < 1e-9, "{now} {expected} at a delay of {delay}");
             }
         }

@@ -96,6 +96,22 @@ impl Prepared {
         .collect()
     }
 
+    /// The same model with residual and responses in another domain, every segment in full.
+    pub(crate) fn over(&self, residual: Vec<f64>, responses: Vec<Vec<f64>>, segments: Vec<Square>) -> Self {
+        let columns = self.columns.clone();
+        let (reference, gains) = (self.reference.clone(), self.gains.clone());
+        let (surcharges, bounds) = (self.surcharges.clone(), self.bounds.clone());
+        let weight = vec![1.0; segments.len()];
+        Self { columns, reference, residual, responses, gains, segments, surcharges, bounds, weight }
+    }
+
+    /// Multiplies residual and responses.
+    pub(crate) fn scale(&mut self, by: f64) {
+        let all = self.responses.iter_mut().chain(std::iter::once(&mut self.residual));
+        all.for_each(|column| column.iter_mut().for_each(|x| *x *= by));
+        self.segments.iter_mut().for_each(|m| m.a.iter_mut().for_each(|x| *x *= by * by));
+    }
+
     /// Weighs each segment by how far its residual square is above the noise.
     fn weigh(&mut self, squares: &[f64]) {
         for s in 0..self.segments.len() {
@@ -194,7 +210,8 @@ impl Fit {
         fit
     }
 
-    fn solve(prepared: Vec<Prepared>) -> Self {
+    /// Solves normal equations once, without a weight.
+    pub(crate) fn solve(prepared: Vec<Prepared>) -> Self {
         let (places, keys) = layout(&prepared);
         let mut priors = vec![Prior::FREE; keys.len()];
         for (one, places) in prepared.iter().zip(&places) {

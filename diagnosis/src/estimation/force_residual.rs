@@ -39,6 +39,14 @@ impl Estimator {
         self.residual_of(track, &track.blocks.z, total)
     }
 
+    /// The force of an input in the band, as an acceleration, per block: what it takes off the
+    /// residual.
+    pub(crate) fn response(&self, track: &BlockedRecording, input: &Total) -> Vec<f64> {
+        let mut out = self.residual_of(track, &vec![0.0; track.block_count()], input);
+        out.iter_mut().for_each(|x| *x = -*x);
+        out
+    }
+
     /// The same of other readings of the recording.
     fn residual_of(&self, track: &BlockedRecording, z: &[f64], total: &Total) -> Vec<f64> {
         // The same filter everywhere: neither quantisation nor rest changes it.
@@ -151,9 +159,6 @@ impl Estimator {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::estimation::fit::Fit;
-    use crate::estimation::model::Model;
-    use crate::estimation::nominal::{Key, Nominal};
     use crate::io::recording::Recording;
     use crate::io::rig::Rig;
     use numerics::bootstrap::Random;
@@ -180,38 +185,5 @@ mod tests {
         let rms = (inner.iter().map(|x| x * x).sum::<f64>() / inner.len() as f64).sqrt();
         let said = estimator.white(&Noise { sensor: 1.0, white, slow: 0.0, tau: 1.0, rest: 0.0, blur: 0.0 });
         assert!((rms / said - 1.0).abs() < 0.05, "{rms} instead of {said}");
-    }
-
-    /// An axis with a load on a spring: within the band it moves with the load, and far beyond it
-    /// alone.
-    #[test]
-    fn a_fit_in_the_band_knows_nothing_of_faster_motion() {
-        let (dt, slow_hz, fast_hz) = (1e-3, 2.0, 60.0);
-        let (slow_gain, fast_gain) = (1.0, 2.0);
-        let of = |hz: f64, gain: f64, t: f64| -gain * (TAU * hz * t).sin() / (TAU * hz).powi(2);
-        let time_s: Vec<f64> = (0..10_000).map(|row| f64::from(row) * dt).collect();
-        let command =
-            |t: &f64| (TAU * slow_hz * (t + 0.5 * dt)).sin() + (TAU * fast_hz * (t + 0.5 * dt)).sin();
-        let counts = |t: &f64| 1e7 * (of(slow_hz, slow_gain, *t) + of(fast_hz, fast_gain, *t));
-        let recording = Recording {
-            command: time_s.iter().map(command).collect(),
-            position_counts: time_s.iter().map(counts).map(f64::round).collect(),
-            time_s,
-            ..Recording::default()
-        };
-        let mut rig = Rig::of_values(1.0, 0.0, 0.0);
-        rig.encoder.counts_per_unit = 1e7;
-        rig.actuator.gain = 1.3;
-        rig.uncertainty.inertia = Some(0.9);
-        let tracks = [BlockedRecording::new(&recording, &rig)];
-        let nominal = Nominal::of(&rig);
-        let noise = Noise { sensor: 1.0, white: 1e-3, slow: 0.0, tau: 1.0, rest: 0.0, blur: 0.0 };
-        let gain = |noise: &Noise| {
-            Fit::new(&Model::default(), &nominal, &tracks, noise).value(Key::Gain).expect("it has one")
-        };
-        let in_band = gain(&Estimator { bandwidth_hz: 8.0 }.weighing(&tracks, &noise));
-        assert!((in_band / slow_gain - 1.0).abs() < 0.03, "{in_band} in the band");
-        let everywhere = gain(&noise);
-        assert!(everywhere > 1.2 * slow_gain, "{everywhere} over all frequencies");
     }
 }

@@ -1,6 +1,7 @@
 //! From recordings and a model of fixed structure to coefficients, noise and motion. Nothing here
 //! chooses between effects.
 
+pub(crate) mod band_fit;
 pub(crate) mod blocked_recording;
 pub(crate) mod blocks;
 pub(crate) mod covariance;

@@ -12,6 +12,7 @@ use crate::estimation::regressors::kept_inputs;
 use numerics::linear::Prior;
 
 /// One column over one recording.
+#[derive(Debug, Clone)]
 pub(crate) struct Column {
     pub(crate) key: Key,
     pub(crate) input: Input,

@@ -93,13 +93,15 @@ pub(super) fn is_material(table: &FitTable) -> bool {
 
 /// The model with the named effects and no other, where that is another one: what is not named was
 /// not found, and may be in no patched rig. An effect that has no size without the others is not
-/// named either, nor are effects that together take no material part off the held-out force error.
+/// named either, nor are effects of the filter that together take no material part off the held-out
+/// force error; those of the regression were judged by that before.
 fn only_named(scales: &Scales, weighed: &mut WeighedModel) -> Option<Shown> {
     let Scales { context, refit, null, holdout, .. } = *scales;
+    let by_shares = !weighed.materials.is_empty();
     loop {
         let named = weighed.named();
         if named.len() == weighed.effects.len() {
-            if named.is_empty() || is_material(&weighed.shown.table) {
+            if by_shares || named.is_empty() || is_material(&weighed.shown.table) {
                 return None;
             }
             weighed.weakest_is_immaterial(part_off(&weighed.shown.table));
@@ -109,7 +111,7 @@ fn only_named(scales: &Scales, weighed: &mut WeighedModel) -> Option<Shown> {
         let effects = named.iter().map(|i| last.model.effects[*i].clone()).collect();
         let model = Model { effects, ..last.model.clone() };
         let slow = context.fit_slow(model, &[&null.noise, &last.noise]);
-        let patched = context.fit_shown(slow.model, &slow.noise, !weighed.materials.is_empty());
+        let patched = context.fit_shown(slow.model, &slow.noise, by_shares);
         let is_there = |place: usize| {
             let values = parameters::parameters(context, &patched, place);
             let name = patched.model.effects[place].name;
@@ -125,7 +127,7 @@ fn only_named(scales: &Scales, weighed: &mut WeighedModel) -> Option<Shown> {
             continue;
         }
         let shown = Shown::new(context, &holdout.smoothed, &weighed.estimator, refit, patched);
-        if named.is_empty() || is_material(&shown.table) {
+        if by_shares || named.is_empty() || is_material(&shown.table) {
             return Some(shown);
         }
         weighed.weakest_is_immaterial(part_off(&shown.table));

@@ -14,7 +14,7 @@ use super::run_forward::{follows_worse, pooled, simulated};
 use super::verdict::verdict;
 use crate::effects::EffectName;
 use crate::estimation::blocked_recording::BlockedRecording;
-use crate::estimation::fit::Fit;
+use crate::estimation::filter::Noise;
 use crate::estimation::force_residual::Estimator;
 use crate::estimation::nominal::{Kept, Key, Nominal};
 use crate::estimation::skew;
@@ -23,12 +23,12 @@ use crate::io::rig::Rig;
 use crate::io::schema::{Place, Region, Stretch, Verdict};
 use crate::selection::context::FittedModel;
 use crate::selection::untested::{self, NotTested};
+use crate::validation::beside_rivals;
 use crate::validation::comparison::Shown;
 use crate::validation::confidence;
 use crate::validation::free_form_check::{FreeFormShare, Unnamed};
 use crate::validation::known_travel;
 use crate::validation::material;
-use crate::validation::parameters;
 use crate::validation::rejection::Rejection;
 use crate::validation::residual_maps::{self, Map};
 use crate::validation::residuals::{Residuals, above};
@@ -76,11 +76,11 @@ pub(crate) fn decide(
         verdict,
         reason,
         effects,
-        hypotheses: hypotheses(&assessment.weighed, &untested, &prepared.nominal),
+        hypotheses: hypotheses(&assessment.weighed, &untested, prepared),
         untested,
         contenders: contenders(prepared, assessment),
         errors: shown.table.clone(),
-        moved: moved(&prepared.nominal, &shown.patched.fit),
+        moved: moved(&prepared.nominal, &assessment.fit, &shown.patched),
         bandwidth_hz: estimator.bandwidth_hz,
         noise_floor: assessment.weighed.floor,
         unexplained_fraction: unexplained_fraction(shown, assessment.weighed.floor),
@@ -99,7 +99,8 @@ pub(crate) fn decide(
 }
 
 /// Returns the values of the rig that a fit moved.
-fn moved(nominal: &Nominal, fit: &Fit) -> Moved {
+fn moved(nominal: &Nominal, tracks: &[BlockedRecording], shown: &FittedModel) -> Moved {
+    let FittedModel { fit, noise, .. } = shown;
     let ratio = fit.value(Key::Gain).unwrap_or(nominal.gain());
     let by_gain = nominal.gain() / ratio;
     let is_known = nominal.virtual_inertia == 0.0 && by_gain > 0.0;
@@ -109,7 +110,18 @@ fn moved(nominal: &Nominal, fit: &Fit) -> Moved {
         deviations: if is_known { by_gain.ln() / nominal.gain_sd() } else { 0.0 },
         is_at_limit: is_known && nominal.is_at_limit(ratio),
         is_hidden: nominal.kept_inertia == Some(Kept::OfRig),
+        scatter: nominal.rig.encoder.noise_counts.is_none().then(|| scatter(nominal, tracks, noise)),
     }
+}
+
+/// Standard deviation of a reading by its noise, counts: the median over the blocks.
+fn scatter(nominal: &Nominal, tracks: &[BlockedRecording], noise: &Noise) -> f64 {
+    let of_row = |t: &BlockedRecording| t.rows.per_block as f64;
+    let mut squares: Vec<f64> =
+        tracks.iter().flat_map(|t| t.blocks.quantum.iter().map(move |q| q * of_row(t))).collect();
+    squares.sort_by(f64::total_cmp);
+    let middle = squares.get(squares.len() / 2).copied().unwrap_or(0.0);
+    (noise.sensor * middle).sqrt() * nominal.rig.encoder.counts_per_unit
 }
 
 /// The data that a decision rests on.
@@ -157,7 +169,7 @@ impl Decision<'_> {
     fn named_effects(&self, with_named: Option<&Shown>, follows_worse: bool) -> Vec<NamedEffect> {
         let Assessment { fit, weighed, .. } = self.assessment;
         let nominal = &self.prepared.nominal;
-        let patched = &with_named.unwrap_or(&weighed.shown).patched;
+        let (context, patched) = (self.prepared.context(fit), &with_named.unwrap_or(&weighed.shown).patched);
         let one = |(i, effect): (usize, &WeighedEffect)| NamedEffect {
             name: effect.found.effect.name,
             class: effect.class.clone(),
@@ -165,10 +177,7 @@ impl Decision<'_> {
                 true => confidence::with_worse_motion(effect.confidence),
                 false => effect.confidence,
             },
-            parameters: match with_named {
-                Some(_) => parameters::parameters(&self.prepared.context(fit), patched, i),
-                None => effect.parameters.clone(),
-            },
+            parameters: beside_rivals::widened(&context, patched, i, &effect.found.rivals),
             place: place(nominal, fit, patched, i),
         };
         let named = weighed.named().into_iter().map(|i| &weighed.effects[i]).enumerate();
@@ -211,7 +220,7 @@ fn unexplained_fraction(shown: &Shown, floor: f64) -> f64 {
 fn hypotheses(
     weighed: &WeighedModel,
     untested: &[(EffectName, NotTested)],
-    nominal: &Nominal,
+    prepared: &Prepared,
 ) -> Vec<JudgedHypothesis> {
     let of_effect = |effect: &WeighedEffect| JudgedHypothesis {
         name: effect.found.effect.name,
@@ -243,10 +252,12 @@ fn hypotheses(
         lost(rejected.name, rejected.holdout_gain, rejected.why.clone());
     }
     let is_tested = |name: &EffectName| untested.iter().all(|(other, _)| other != name);
-    let is_in_question =
-        |name: &&EffectName| name.definition().is_sought() && is_tested(name) && !nominal.holds(**name);
+    let is_in_question = |name: &&EffectName| {
+        name.definition().is_sought() && is_tested(name) && !prepared.nominal.holds(**name)
+    };
     for name in EffectName::ALL.iter().filter(is_in_question) {
-        lost(*name, None, Rejection::LessInSearch);
+        let is_sought = !prepared.unsought.contains(name);
+        lost(*name, None, if is_sought { Rejection::LessInSearch } else { Rejection::NotInMotion });
     }
     out
 }

@@ -72,6 +72,8 @@ pub(crate) struct Moved {
     pub(crate) is_at_limit: bool,
     /// True if the recordings do not show the inertia, so that the rig's was kept.
     pub(crate) is_hidden: bool,
+    /// Standard deviation of a reading, counts, where the rig declares none.
+    pub(crate) scatter: Option<f64>,
 }
 
 /// A diagnosis of recordings that sufficed for a verdict.

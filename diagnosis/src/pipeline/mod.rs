@@ -78,14 +78,18 @@ pub(crate) fn run(rig: &Rig, checked: &Checked, progress: Progress) -> Result<Di
     }
     let (fit, holdout) = (&*checked.fit, &*checked.holdout);
     let all: Vec<&Recording> = fit.iter().chain(holdout).collect();
-    let mut prepared = prepare::prepare(rig, checked, None, progress);
-    let mut found = search::search(&prepared, progress);
+    let proposed = |skew_rows| {
+        let mut prepared = prepare::prepare(rig, checked, skew_rows, progress);
+        progress("comparing shares of the force", 0.12);
+        let rounds = proposals::propose(&prepared, checked);
+        prepared.unsought = proposals::unsought(&rounds);
+        let found = search::search(&prepared, progress);
+        (prepared, rounds, found)
+    };
+    let (mut prepared, mut rounds, mut found) = proposed(None);
     if let Some(rows) = hidden_skew(&prepared, &found) {
-        prepared = prepare::prepare(rig, checked, Some(rows), progress);
-        found = search::search(&prepared, progress);
+        (prepared, rounds, found) = proposed(Some(rows));
     }
-    progress("comparing shares of the force", 0.9);
-    let rounds = proposals::propose(&prepared, checked);
     let assessed = assessed(&prepared, found, &rounds);
     progress("writing down", 0.95);
     let rate_hz = all.iter().map(|recording| recording.rate_hz()).min_by(f64::total_cmp);

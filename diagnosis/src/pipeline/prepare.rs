@@ -36,12 +36,15 @@ pub(crate) struct Prepared {
     pub(crate) scale: f64,
     /// Noise under the refitted nominal model.
     pub(crate) noise: Noise,
+    /// Laws of the command that the force which the motion asks for does not show.
+    pub(crate) unsought: Vec<EffectName>,
 }
 
 impl Prepared {
     /// Returns the context of a search over recordings in some motion.
     pub(crate) fn context<'a>(&'a self, tracks: &'a [BlockedRecording]) -> FitContext<'a> {
-        FitContext { nominal: &self.nominal, tracks, span: &self.span, scale: self.scale }
+        let Self { nominal, span, scale, unsought, .. } = self;
+        FitContext { nominal, tracks, span, scale: *scale, unsought }
     }
 
     /// The facts about the axis that recordings in some motion show.
@@ -88,7 +91,8 @@ pub(crate) fn prepare(rig: &Rig, checked: &Checked, skew_rows: Option<f64>, prog
     for (r, track) in tracks.iter_mut().enumerate() {
         (track.place, track.bias) = (Some(r), first.fit.bias(r));
     }
-    Prepared { given: rig.clone(), nominal, fit: tracks, holdout, span, scale, noise }
+    let unsought = Vec::new();
+    Prepared { given: rig.clone(), nominal, fit: tracks, holdout, span, scale, noise, unsought }
 }
 
 /// Part of the force that a refit may leave for the forces to be in balance.

@@ -2,9 +2,12 @@
 
 use super::prepare::Prepared;
 use crate::data_faults::Checked;
+use crate::effects::EffectName;
 use crate::estimation::skew;
 use crate::io::recording::Recording;
 use crate::io::rig::{Kind, Rig};
+use crate::thresholds::FOLLOWS_SHARE;
+use regression::laws::{ActsOn, Law};
 use regression::{Hypothesis, Part, Value};
 
 /// The rounds of the regression, each with the best of every law, the chosen one first; none where
@@ -20,6 +23,17 @@ pub(crate) fn propose(prepared: &Prepared, checked: &Checked) -> Vec<Vec<Hypothe
     recordings.extend(part(&checked.holdout, Part::Holdout));
     regression::propose(&nominal(&prepared.given, late_s), &recordings)
         .map_or_else(|_| Vec::new(), |found| found.rounds)
+}
+
+/// The laws of the command that have no size in any round of the regression and take next to
+/// nothing of the force error there; none where it found nothing at all. A term with the recorded command in it makes both sides smaller, so likelihood
+/// alone finds such laws wherever other physics limits; the regression's columns hold none of it.
+pub(crate) fn unsought(rounds: &[Vec<Hypothesis>]) -> Vec<EffectName> {
+    let takes = |one: &Hypothesis| one.valid || one.evidence.share >= FOLLOWS_SHARE;
+    let is_held = |law: &Law| rounds.iter().flatten().any(|one| one.law == law && takes(one));
+    let all = regression::laws::library().filter(|law| law.acts_on == ActsOn::Command && !is_held(law));
+    let found = if rounds.is_empty() { Vec::new() } else { all.collect() };
+    found.iter().filter_map(|law| EffectName::find(law.name)).collect()
 }
 
 fn plain(r: &Recording, part: Part) -> regression::Recording {
@@ -53,5 +67,41 @@ fn nominal(rig: &Rig, late_s: f64) -> regression::Rig {
         noise_counts: encoder.noise_counts.unwrap_or(0.0),
         turn: rig.turn(),
         start_spread: encoder.start_spread,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use regression::{Evidence, laws};
+
+    fn of(name: &str, valid: bool, share: f64) -> Hypothesis {
+        let evidence = Evidence {
+            share,
+            z: 3.0,
+            size_agreement: 0.9,
+            lead_z: 1.0,
+            free_form_more: 0.0,
+            residual_over_noise: 10.0,
+            rows: 1000.0,
+            held_out: None,
+        };
+        let law = laws::library().find(|law| law.name == name).expect("a law of the library");
+        Hypothesis { law, shapes: Vec::new(), coefficients: vec![1.0], valid, evidence }
+    }
+
+    #[test]
+    fn a_law_of_the_command_that_takes_nothing_is_not_sought() {
+        assert!(unsought(&[]).is_empty(), "nothing was found at all");
+        let delay = of("command_delay", false, 0.04);
+        let rounds = [
+            vec![of("cogging", true, 0.6), delay, of("supply_limit", true, 0.01)],
+            vec![of("command_deadband", false, 0.06)],
+        ];
+        let left_out = unsought(&rounds);
+        assert!(left_out.contains(&EffectName::CommandDelay) && left_out.contains(&EffectName::GainDrift));
+        assert!(!left_out.contains(&EffectName::CommandDeadband), "it takes a part in one round");
+        assert!(!left_out.contains(&EffectName::SupplyLimit), "it has a size in one round");
+        assert!(!left_out.contains(&EffectName::ViscousFriction), "it is of the motion");
     }
 }

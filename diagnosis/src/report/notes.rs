@@ -9,6 +9,9 @@ const FAR: f64 = 2.0;
 /// digit shown.
 const SKEWED: f64 = 0.005;
 
+/// Scatter of a reading, counts, from which its noise is no longer that of counting, which is 0.29.
+const SCATTERS: f64 = 1.0;
+
 /// The note where the motion shows no inertia.
 const HIDDEN: &str =
     "the recordings do not show the inertia, so the rig's is kept: a faster motion would show it";
@@ -22,7 +25,12 @@ pub(crate) fn notes(moved: &Moved) -> Vec<String> {
         (false, true) => Some(inertia(moved)),
         (false, false) => None,
     };
-    timing.into_iter().chain(inertia).collect()
+    let scatter = moved.scatter.filter(|counts| *counts >= SCATTERS).map(|counts| {
+        format!(
+            "readings scatter by about {counts:.1} counts, more than whole counts do: if the sensor is analogue, set encoder.noise_counts to that"
+        )
+    });
+    timing.into_iter().chain(inertia).chain(scatter).collect()
 }
 
 fn timing(rows: f64) -> String {
@@ -54,6 +62,7 @@ mod tests {
             deviations: -0.6,
             is_at_limit: false,
             is_hidden: false,
+            scatter: Some(0.3),
         };
         assert!(notes(&near).is_empty());
         assert!(notes(&Moved { late_rows: Some(0.002), ..near }).is_empty());
@@ -63,6 +72,8 @@ mod tests {
         assert!(both[1].contains("0.10 times the rig's, 3.5 of"), "{both:?}");
         let at_limit = notes(&Moved { inertia_by_gain: 4.64, deviations: 1.47, is_at_limit: true, ..near });
         assert!(at_limit[0].contains("4.64 times the rig's, as far as"), "{at_limit:?}");
+        let analogue = notes(&Moved { scatter: Some(3.26), ..near });
+        assert!(analogue.len() == 1 && analogue[0].contains("about 3.3 counts"), "{analogue:?}");
         let hidden = notes(&Moved { is_at_limit: true, is_hidden: true, ..near });
         assert!(hidden.len() == 1 && hidden[0].contains("do not show the inertia"), "{hidden:?}");
     }

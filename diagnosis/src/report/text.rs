@@ -58,6 +58,7 @@ pub(crate) fn rejection(why: &Rejection) -> String {
             format!("the recordings cannot distinguish it from {}", from.in_words())
         }
         Rejection::LessInSearch => "not fitted in full: other effects explained more in the search".into(),
+        Rejection::NotInMotion => "the force that the motion asks for shows nothing of it".into(),
         Rejection::LeavesMore => "what is named instead leaves less of the force error".into(),
         Rejection::Behind { winner, z } => {
             format!("{} explains more by {z:.1} standard errors", winner.in_words())

@@ -294,8 +294,8 @@ mod tests {
         };
         assert_eq!(
             sought(true),
-            sought(false) + 6,
-            "deadband, clip, delay, lag, loss and a gain that drifts"
+            sought(false) + 7,
+            "deadband, clip, supply, delay, lag, loss and a gain that drifts"
         );
     }
 

@@ -1,8 +1,9 @@
 //! The context of every search: the recordings with their nominal model, and fits of a model to
 //! them.
 
-use crate::effects::Effect;
 use crate::effects::definition::Span;
+use crate::effects::{Effect, EffectName};
+use crate::estimation::band_fit::in_band;
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::effective_command::effective_commands;
 use crate::estimation::filter::Noise;
@@ -30,6 +31,8 @@ pub(crate) struct FitContext<'a> {
     pub(crate) span: &'a Span,
     /// Acceleration that the command makes: the scale of the noise search.
     pub(crate) scale: f64,
+    /// Effects that are not sought, whatever the likelihood says.
+    pub(crate) unsought: &'a [EffectName],
 }
 
 /// Cost of one fitted value in log-likelihood: half the logarithm of the number of independent
@@ -70,8 +73,8 @@ impl FitContext<'_> {
     /// Fits a model again, to the force in the band that people see.
     pub(crate) fn fit_in_band(&self, white: FittedModel) -> FittedModel {
         let estimator = Estimator::new(self.tracks, &white.noise, self.scale);
-        let noise = estimator.weighing(self.tracks, &white.noise);
-        if noise == white.noise { white } else { self.fit_at(white.model, &noise) }
+        let fit = in_band(white.fit, self.tracks, &estimator);
+        FittedModel { fit, ..white }
     }
 
     /// Returns the cost of the freedom of all effects of a model, nats.

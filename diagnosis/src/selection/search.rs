@@ -64,6 +64,7 @@ impl FitContext<'_> {
         let no_losses = self.tracks.iter().all(|t| t.jumps.lost.iter().all(|x| *x == 0.0));
         let is_tried = |name: &N| {
             !there(*name)
+                && !self.unsought.contains(name)
                 && (!name.definition().is_of_jumps() || !no_losses)
                 && candidates::is_seen(*name, self.nominal)
                 && wanted(*name)

@@ -60,7 +60,7 @@ impl Plant {
     pub fn unpowered(rig: &Rig) -> Self {
         let mut plant = Self::new(rig);
         plant.commands.iter_mut().for_each(|law| {
-            law.step(0.0, 0.0);
+            law.step(0.0, 0.0, 0.0);
         });
         plant
     }
@@ -70,7 +70,7 @@ impl Plant {
         let limit = self.rig.actuator.limit.unwrap_or(f64::INFINITY);
         let mut effective = command.clamp(-limit, limit);
         for law in &mut self.commands {
-            effective = law.step(effective, dt);
+            effective = law.step(effective, self.velocity, dt);
         }
         let (free, dry) = self.forces(effective, around, dt);
         let before = self.velocity;

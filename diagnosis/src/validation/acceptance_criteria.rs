@@ -180,12 +180,6 @@ impl EffectEvidence {
         (part < MATERIAL).then_some(Rejection::Immaterial { part })
     }
 
-    /// Returns why an effect that shares of the force error name may not be named, `is_there` if
-    /// its size is sure; none if it may. Physics without a name was weighed by shares then.
-    pub(crate) fn rejection_by_shares(&self, is_there: bool) -> Option<Rejection> {
-        if is_there { self.immaterial() } else { Some(Rejection::NoSize) }
-    }
-
     /// Returns why an effect may not be named: the first requirement that it does not meet; none if
     /// it meets all.
     pub(crate) fn rejection(&self) -> Option<Rejection> {

@@ -3,6 +3,7 @@
 
 pub(crate) mod acceptance_criteria;
 pub(crate) mod alternatives;
+pub(crate) mod beside_rivals;
 pub(crate) mod comparison;
 pub(crate) mod confidence;
 pub(crate) mod confidence_pass;

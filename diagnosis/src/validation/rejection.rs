@@ -55,6 +55,9 @@ pub(crate) enum Rejection {
     Indistinguishable { from: EffectName },
     /// The search finds more in others.
     LessInSearch,
+    /// The force that the motion asks for, of which the recorded command holds no part, shows
+    /// nothing of a law of the command.
+    NotInMotion,
     /// The model that it is in leaves more of the force error than the one that is named.
     LeavesMore,
     /// Another effect explains more instead.

@@ -174,7 +174,8 @@ impl WeighedModel {
             return Some(Rejection::Indistinguishable { from });
         }
         if assessed.found.material.is_some() {
-            return assessed.found.rejection_by_shares(assessed.is_there);
+            // Its shares of the force error, fitted and held out, were judged before it was fitted.
+            return (!assessed.is_there).then_some(Rejection::NoSize);
         }
         if let Some(swing) = self.swing.filter(TonalDisturbance::is_mistaken) {
             Some(Rejection::Swing { hertz: swing.hertz })

@@ -34,6 +34,11 @@ pub const COUNTS: f64 = 636.619_772_4;
 /// Force at which a grip of size 1 lets go, N·m.
 pub const GRIP: f64 = 7e-4;
 
+/// A supply, V, behind a winding of so many ohms, and its back-EMF, V·s/rad, at size 1.
+const SUPPLY_V: f64 = 1.2;
+const OHMS: f64 = 20.0;
+const BACK_EMF: f64 = 0.015;
+
 /// Square of the command under which a gain that falls with the copper loss settles at its full
 /// change, A².
 pub const WARM_SQUARE: f64 = 1e-3;
@@ -212,6 +217,11 @@ impl<'a> Machine<'a> {
             "command_saturation" => {
                 let limit = 0.06 / (0.5 + s);
                 u.clamp(-limit, limit)
+            }
+            "supply_limit" => {
+                // Volts: the supply less back-EMF, over the winding's resistance.
+                let most = |sign: f64| (sign * SUPPLY_V - BACK_EMF * s * self.v) / OHMS;
+                u.clamp(most(-1.0), most(1.0))
             }
             "command_delay" => {
                 self.queue.push_back(u);

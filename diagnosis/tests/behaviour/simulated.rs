@@ -204,6 +204,18 @@ fn a_lossy_gear_is_named_with_its_fraction() {
     }
 }
 
+/// The plant is a supply behind a winding with back-EMF: no clip with a line was written into it.
+#[test]
+fn a_weak_supply_is_named_with_its_no_load_speed() {
+    for (closed, size) in [(false, 1.0), (true, 1.0), (true, 0.7)] {
+        let outcome = run(&rig(OFF, OFFSET), &Setup { closed, size, ..setup("supply_limit") });
+        let first = outcome.report.effects.first().unwrap_or_else(|| panic!("{}", outcome.summary()));
+        assert_eq!(first.name.as_str(), "supply_limit", "{}", outcome.summary());
+        let speed = first.parameters["no_load_speed"].value * size;
+        assert!((speed / 80.0 - 1.0).abs() < 0.2, "{speed} of 80 rad/s: {}", outcome.summary());
+    }
+}
+
 #[test]
 fn a_nameless_force_is_reported_where_it_explains_most() {
     let outcome = run(&rig(OFF, OFFSET), &Setup { size: 0.3, seed: 5, ..setup("creeping_spring") });

@@ -20,7 +20,7 @@ const fn law(
 }
 
 /// The laws, as maps from the force û to what has to be commanded beyond it.
-pub(super) static LAWS: [Law; 6] = [
+pub(super) static LAWS: [Law; 7] = [
     law(
         "command_deadband",
         "w·clip(û/x, ±1)",
@@ -36,6 +36,14 @@ pub(super) static LAWS: [Law; 6] = [
         Size::Positive,
         clip_shapes,
         clip,
+    ),
+    law(
+        "supply_limit",
+        "û beyond L·(1 − q̇·sgn û/v)",
+        "L over the large force; v over the fast speed in the form",
+        Size::Positive,
+        supply_shapes,
+        supply,
     ),
     law("command_delay", "û(t + τ) − û(t)", "τ, s", Size::OfShape(0.6, 1.6), delay_shapes, delay),
     law("electrical_lag", "τ·dû/dt", "", Size::Positive, lag_shapes, lag),
@@ -145,6 +153,20 @@ fn clip(m: &Machine, i: usize, shape: &Shape) -> Vec<Vec<f64>> {
         _ => inverse(u, 12),
     };
     vec![m.asked[i].iter().map(one).collect()]
+}
+
+/// Speeds without load over the fast speed: beyond twice that, the limit hardly falls.
+const NO_LOAD: [(&str, f64); 3] = [("1.1", 1.1), ("1.4", 1.4), ("2", 2.0)];
+
+fn supply_shapes(m: &Machine) -> Vec<Shape> {
+    let at = |(form, _): &(&'static str, f64)| Shape::grid(form, &[0.6, 0.85, 1.2, 1.7]);
+    if_driven(m, NO_LOAD.iter().flat_map(at).collect())
+}
+fn supply(m: &Machine, i: usize, shape: &Shape) -> Vec<Vec<f64>> {
+    let (s, u) = (&m.states[i], &m.asked[i]);
+    let speed = NO_LOAD.iter().find(|one| one.0 == shape.form).map_or(1.0, |one| one.1) * m.scales.fast;
+    let limit = |k: usize| shape.value * large(m) * (1.0 - s.v[k] * u[k].signum() / speed);
+    vec![s.each(|k| u[k].signum() * (u[k].abs() - limit(k)).max(0.0))]
 }
 
 fn delay_shapes(m: &Machine) -> Vec<Shape> {

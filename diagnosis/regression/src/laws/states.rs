@@ -53,12 +53,14 @@ pub struct Scales {
     pub stroke: f64,
     /// See `stroke`.
     pub short_stroke: f64,
-    /// Middle and half of the travel of all, and least travel of a recording.
+    /// Middle and half of the travel of all, and least and most travel of a recording.
     pub middle: f64,
     /// See `middle`.
     pub half_travel: f64,
     /// See `middle`.
     pub least_travel: f64,
+    /// See `middle`.
+    pub most_travel: f64,
     /// Longest recording, s.
     pub seconds: f64,
     /// Standard deviation of a reading.
@@ -160,7 +162,7 @@ impl Scales {
         let low = bound(0.005).fold(f64::INFINITY, f64::min);
         let high = bound(0.995).fold(f64::NEG_INFINITY, f64::max);
         let most = |f: &dyn Fn(usize) -> f64| fit.iter().map(|i| f(*i)).fold(0.0, f64::max);
-        let least_travel = fit.iter().map(|i| numerics::spread::spread(&states[*i].q));
+        let travels = fit.iter().map(|i| numerics::spread::spread(&states[*i].q));
         Self {
             band_hz: tiling.band_hz,
             lowest_hz: tiling.rows.iter().map(|r| r.hz).fold(f64::INFINITY, f64::min),
@@ -171,7 +173,8 @@ impl Scales {
             short_stroke: all(|s| &s.since, 0.9),
             middle: 0.5 * (low + high),
             half_travel: (0.5 * (high - low)).max(1e-12),
-            least_travel: least_travel.fold(f64::INFINITY, f64::min),
+            least_travel: travels.clone().fold(f64::INFINITY, f64::min),
+            most_travel: travels.fold(0.0, f64::max),
             seconds: most(&|i| signals[i].h * signals[i].len() as f64),
             noise: most(&|i| signals[i].noise),
             driven: true,

@@ -55,6 +55,7 @@ fn machine(q: impl Fn(f64) -> f64, asked: impl Fn(f64) -> f64) -> Machine {
         middle: 0.0,
         half_travel: 10.0,
         least_travel: 20.0,
+        most_travel: 20.0,
         seconds: 4.0,
         noise: 1e-6,
         driven: true,

@@ -63,8 +63,9 @@ fn cogging_shapes(m: &Machine) -> Vec<Shape> {
     Shape::grid("period", &periods)
 }
 fn imbalance_shapes(m: &Machine) -> Vec<Shape> {
-    // Over a fifth of a turn, a sine bends by a tenth and differs from a spring.
-    let seen = m.rig.rotary && m.scales.least_travel > 0.2 * TAU;
+    // Over a fifth of a turn, a sine bends by a tenth and differs from a spring; one recording that
+    // goes so far is enough.
+    let seen = m.rig.rotary && m.scales.most_travel > 0.2 * TAU;
     if seen { vec![Shape::fixed("order", TAU)] } else { Vec::new() }
 }
 fn wave(m: &Machine, i: usize, shape: &Shape) -> Vec<Vec<f64>> {

@@ -206,7 +206,4 @@ fn an_effect_that_takes_less_than_a_twentieth_is_not_named() {
     let part = |off_force| EffectEvidence { off_force, ..found() };
     assert_eq!(part(0.04).immaterial(), Some(Rejection::Immaterial { part: 0.04 }));
     assert_eq!(part(0.06).immaterial(), None);
-    let by_share = |off_force| part(off_force).rejection_by_shares(true);
-    assert_eq!((by_share(0.04), by_share(0.06)), (Some(Rejection::Immaterial { part: 0.04 }), None));
-    assert_eq!(part(0.06).rejection_by_shares(false), Some(Rejection::NoSize));
 }
