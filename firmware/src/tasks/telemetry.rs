@@ -143,10 +143,8 @@ impl<B: Board> Telemetry<B> {
         self.endpoint.set_interlocks(Interlocks(self.shared.conditions.get().0 & !saving.0));
         self.endpoint.set_fitted(self.shared.fitted());
         // Its hashes for hello and flash take half a millisecond: it pauses as a save does.
-        if !self.save_pauses()
-            && let Some(planned) = self.ends.plans_made.dequeue()
-        {
-            self.endpoint.take_plan(planned);
+        if !self.save_pauses() && self.ends.plans_made.ready() {
+            self.take_plan();
         }
         while let Some(packet) = self.ends.from_pc.dequeue() {
             self.heard_ms = self.shared.supervised_ms.load(Relaxed);
@@ -173,12 +171,8 @@ impl<B: Board> Telemetry<B> {
         }
         B::allow_usb(true);
         self.forward_orders();
-        if self.ends.plans_asked.ready()
-            && let Some(request) = self.endpoint.plan_asked()
-        {
+        if self.ends.plans_asked.ready() && self.ask_for_plan() {
             self.written_ms = ms;
-            // There is room: just seen.
-            let _ = self.ends.plans_asked.enqueue(request);
         }
         self.guard_supply();
         let in_session = self.endpoint.in_session();
@@ -189,6 +183,21 @@ impl<B: Board> Telemetry<B> {
             let _ = self.filling.push(FRAME_END);
         }
         self.in_session = in_session;
+    }
+
+    /// Takes a plan that was made. On its own, because a plan takes much room on the stack.
+    #[inline(never)]
+    fn take_plan(&mut self) {
+        if let Some(planned) = self.ends.plans_made.dequeue() {
+            self.endpoint.take_plan(planned);
+        }
+    }
+
+    /// Passes on what the planner is asked for, if there is anything; it has room.
+    #[inline(never)]
+    fn ask_for_plan(&mut self) -> bool {
+        let Some(request) = self.endpoint.plan_asked() else { return false };
+        self.ends.plans_asked.enqueue(request).is_ok()
     }
 
     /// A stop waits for nothing: what waits before it and gives torque is dropped.
