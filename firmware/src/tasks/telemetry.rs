@@ -143,7 +143,8 @@ impl<B: Board> Telemetry<B> {
         self.endpoint.set_interlocks(Interlocks(self.shared.conditions.get().0 & !saving.0));
         self.endpoint.set_fitted(self.shared.fitted());
         // Its hashes for hello and flash take half a millisecond: it pauses as a save does.
-        if !self.save_pauses() && self.ends.plans_made.ready() {
+        let takes_plan = !self.save_pauses() && self.ends.plans_made.ready();
+        if takes_plan {
             self.take_plan();
         }
         while let Some(packet) = self.ends.from_pc.dequeue() {
@@ -154,7 +155,8 @@ impl<B: Board> Telemetry<B> {
                 // Its answer waits for nothing that came after it.
                 self.send_frames();
             }
-            self.forward_orders();
+            // It saves nothing: a stop may be in the next packet.
+            self.forward_orders(false);
             self.endpoint.set_ahead(self.ahead());
             if B::cycles().wrapping_sub(entered) >= timing::COMMAND_CYCLES {
                 B::wake_telemetry();
@@ -170,7 +172,7 @@ impl<B: Board> Telemetry<B> {
             self.shared.line.set(&line);
         }
         B::allow_usb(true);
-        self.forward_orders();
+        self.forward_orders(!takes_plan);
         if self.ends.plans_asked.ready() && self.ask_for_plan() {
             self.written_ms = ms;
         }
@@ -222,10 +224,12 @@ impl<B: Board> Telemetry<B> {
         self.endpoint.answer_guard(result);
     }
 
-    /// Passes orders on until there are no more or the tick has no room.
-    fn forward_orders(&mut self) {
+    /// Passes orders on until there are no more, the tick has no room, or one is to be saved and may
+    /// not.
+    fn forward_orders(&mut self, may_save: bool) {
+        let may_save = may_save && !(self.saving.is_some() && self.save_pauses());
         // It is large: taking it out and putting it back for each packet takes longer than a line.
-        if self.saving.is_some() && self.save_pauses() {
+        if !may_save && matches!(self.held, Some(AnyOrder::Large(LargeOrder::Configure(_)))) {
             return;
         }
         while let Some(order) = self.held.take().or_else(|| self.endpoint.next_order()) {
@@ -243,7 +247,7 @@ impl<B: Board> Telemetry<B> {
                 AnyOrder::Small(order) => Some(order),
                 AnyOrder::Large(large) => {
                     if let LargeOrder::Configure(plan) = &large
-                        && self.save(plan).is_err()
+                        && (!may_save || self.save(plan).is_err())
                     {
                         self.held = Some(large.into());
                         return;
