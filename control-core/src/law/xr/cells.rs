@@ -35,7 +35,7 @@ struct Axis<const N: usize> {
 }
 
 impl<const N: usize> Axis<N> {
-    /// Of knots in Q16 that are at least 0.01 apart. Out of line: it takes less flash.
+    /// Returns that of knots in Q16 that are at least 0.01 apart. Out of line: it takes less flash.
     #[inline(never)]
     fn new(knots: &[i32]) -> Self {
         let mut axis = Self { knots: [i32::MAX; N], per_gap: [0; N], last: knots.len().saturating_sub(1) };
