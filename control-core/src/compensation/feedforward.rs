@@ -136,10 +136,10 @@ impl Feedforward {
         self.fed
     }
 
-    /// One tick, number `turn` modulo 16: the torque to ask for instead of `wanted`, and whether the
-    /// passivity observer has held some of it back. Out of line: a tick that feeds nothing forward is
-    /// not to pay for it. Not `cold`: that costs such a tick five instructions. In pairs, which
-    /// registers hold.
+    /// One tick, number `turn` modulo 16: the torque to ask for instead of `wanted`, and whether
+    /// the passivity observer has held some of it back. Out of line: a tick that feeds nothing
+    /// forward is not to pay for it. Not `cold`: that costs such a tick five instructions. In
+    /// pairs, which registers hold.
     #[inline(never)]
     pub(crate) fn tick(
         &mut self,

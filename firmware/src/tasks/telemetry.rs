@@ -224,8 +224,8 @@ impl<B: Board> Telemetry<B> {
         self.endpoint.answer_guard(result);
     }
 
-    /// Passes orders on until there are no more, the tick has no room, or one is to be saved and may
-    /// not.
+    /// Passes orders on until there are no more, the tick has no room, or one is to be saved and
+    /// may not.
     fn forward_orders(&mut self, may_save: bool) {
         let may_save = may_save && !(self.saving.is_some() && self.save_pauses());
         // It is large: taking it out and putting it back for each packet takes longer than a line.

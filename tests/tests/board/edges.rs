@@ -185,8 +185,8 @@ fn patients() -> [(&'static str, Config, &'static [&'static [Range]]); 5] {
     ]
 }
 
-/// Moves a value of `config` to one end of its range: from the one that is taken and the one that is
-/// not; the values between are halved until there are none.
+/// Moves a value of `config` to one end of its range: the values between one that is taken and one
+/// that is not are halved until there are none.
 fn to_end(config: &mut Config, &(name, set, ends): &Range, end: usize) {
     let [mut taken, mut refused] = ends[end];
     let with = |value| {
