@@ -211,7 +211,7 @@ impl Insertion {
         let due = core::mem::replace(&mut self.happened, happened);
         self.busy = due | happened;
         if due != 0 {
-            self.look_at_vessel(anatomy, &mut transitions);
+            transitions.flashback = self.look_at_vessel(anatomy);
         }
         self.pass_beside(anatomy, depth);
         transitions
@@ -300,10 +300,10 @@ impl Insertion {
     }
 
     /// The tip's place as seen from a vessel that it does not pass beside: in the tick after a
-    /// layer was touched, gave way or was left.
+    /// layer was touched, gave way or was left. True if it has come into the lumen.
     #[inline(never)]
-    fn look_at_vessel(&mut self, anatomy: &Anatomy, transitions: &mut Transitions) {
-        let Some(Vessel::Met { near, far }) = anatomy.vessel else { return };
+    fn look_at_vessel(&mut self, anatomy: &Anatomy) -> bool {
+        let Some(Vessel::Met { near, far }) = anatomy.vessel else { return false };
         let is_past = |wall: Passage| {
             self.touched > wall.layer && self.given >= wall.given && self.open & wall.opens == wall.opens
         };
@@ -316,7 +316,7 @@ impl Insertion {
         } else {
             VesselState::Outside
         };
-        transitions.flashback |= state == VesselState::InLumen && self.vessel != VesselState::InLumen;
-        self.vessel = state;
+        let before = core::mem::replace(&mut self.vessel, state);
+        state == VesselState::InLumen && before != VesselState::InLumen
     }
 }

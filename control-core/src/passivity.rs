@@ -198,11 +198,11 @@ impl Account {
             // A needle that turns round meets the edge again that it has just passed, and has gone
             // no way in between.
             let has_turned = way.is_negative() != self.way.is_negative();
-            let gone = if has_turned { way - way.signum() } else { way };
+            let gone = if has_turned { way - (way >> 31 | 1) } else { way };
             self.way = way;
-            let given = i64::from(before.to_bits()) * i64::from(gone);
-            let taken = i64::from(friction.to_bits()) * i64::from(gone.unsigned_abs());
-            self.injected = (self.injected + given - taken).max(-store);
+            // Both far from the largest number.
+            let left = if gone.is_negative() { before + friction } else { before - friction };
+            self.injected = (self.injected + i64::from(left.to_bits()) * i64::from(gone)).max(-store);
         }
         let is_along = wanted != I16F16::ZERO && wanted.is_negative() == self.way.is_negative();
         if self.injected > store && is_along { (I16F16::ZERO, true) } else { (wanted, false) }

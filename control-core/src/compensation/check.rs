@@ -1,6 +1,6 @@
 //! Checks that a compensation may be fed forward on a device, and prepares the values for the tick.
 
-use super::feedforward::FeedforwardPlan;
+use super::feedforward::{FeedforwardPlan, ReadyWave};
 use super::{Friction, Gains, VERSION, Wave};
 use crate::config::Device;
 use crate::refusal::{Field, Refusal, within};
@@ -130,13 +130,25 @@ pub(crate) fn prepare(device: &Device) -> FeedforwardPlan {
     });
     let span = found.full_speed.0.saturating_sub(found.rest_speed.0);
     let inverse = |x: I16F16| I16F16::ONE.checked_div(x).unwrap_or_default();
-    FeedforwardPlan {
+    let mut plan = FeedforwardPlan {
         is_some: found.is_some(),
         phase_per_count: u32::try_from(((1_u64 << 32) + counts / 2) / counts).unwrap_or(u32::MAX),
         viscous: [per_speed(&found.inwards), per_speed(&found.outwards)],
         per_blend: per_blend(span),
         per_deadband: inverse(found.deadband.0.saturating_mul_int(2)),
         store: store.to_bits() >> 16,
+        ..FeedforwardPlan::default()
+    };
+    make_ready(&found.angle, &mut plan.angle);
+    make_ready(&found.ripple, &mut plan.ripple);
+    plan
+}
+
+/// Out of line, and not once for each number of waves: it takes less flash.
+#[inline(never)]
+fn make_ready(waves: &[Wave], ready: &mut [ReadyWave]) {
+    for (ready, &wave) in ready.iter_mut().zip(waves) {
+        *ready = wave.into();
     }
 }
 

@@ -4,10 +4,11 @@
 //! Waves are summed in even ticks and ripple in odd ones, weight and gains follow every sixteenth:
 //! at 100 mm/s an order of 50 turns by a tenth of a radian in the tick that this costs.
 
-use super::{Compensation, Gains, Wave};
+use super::{Compensation, Gains, MAX_RIPPLES, MAX_WAVES, Wave};
 use crate::config::Device;
-use crate::math::{sine, truncating_product, upper_half};
+use crate::math::{magnitude, sine, truncating_product, upper_half};
 use crate::passivity::Account;
+use crate::sine::sine as sine_of;
 use crate::units::{MillimetresPerSecond, Milliradians};
 use fixed::types::{I2F30, I16F16};
 
@@ -36,6 +37,25 @@ pub(crate) struct FeedforwardPlan {
     pub(super) per_deadband: I16F16,
     /// The energy that waves by angle may store, mN·m·counts in Q16.
     pub(super) store: i64,
+    pub(super) angle: [ReadyWave; MAX_WAVES],
+    pub(super) ripple: [ReadyWave; MAX_RIPPLES],
+}
+
+/// A [`Wave`] in numbers of which nothing is to be shifted.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct ReadyWave {
+    /// Periods a turn; 0: there are no more waves.
+    order: u32,
+    /// 2^32 are a period.
+    phase: u32,
+    /// Q18: an amplitude stays below 2^13.
+    amplitude: i32,
+}
+
+impl From<Wave> for ReadyWave {
+    fn from(Wave { order, amplitude, phase }: Wave) -> Self {
+        Self { order: order.into(), phase: u32::from(phase) << 16, amplitude: amplitude.to_bits() << 2 }
+    }
 }
 
 /// The rotor's angle and the needle's speed.
@@ -44,9 +64,6 @@ pub(crate) struct RotorState {
     /// The encoder's absolute count, in the direction of insertion.
     pub(crate) count: i32,
     pub(crate) speed: MillimetresPerSecond,
-    pub(crate) tilt: Milliradians,
-    /// Ticks, modulo 16.
-    pub(crate) turn: u32,
 }
 
 /// The feedforward with its memory.
@@ -119,26 +136,28 @@ impl Feedforward {
         self.fed
     }
 
-    /// One tick: the torque to ask for instead of `wanted`, and whether the passivity observer has
-    /// held some of it back. Out of line: a tick that feeds nothing forward is not to pay for it.
-    /// Not `cold`: that costs such a tick five instructions.
+    /// One tick, number `turn` modulo 16: the torque to ask for instead of `wanted`, and whether
+    /// the passivity observer has held some of it back. Out of line: a tick that feeds nothing
+    /// forward is not to pay for it. Not `cold`: that costs such a tick five instructions. In
+    /// pairs, which registers hold.
     #[inline(never)]
     pub(crate) fn tick(
         &mut self,
         found: &Compensation,
         plan: &FeedforwardPlan,
         rotor: RotorState,
+        (turn, tilt): (u32, Milliradians),
         wanted: I16F16,
     ) -> (I16F16, bool) {
         let [angle, friction, _, drive] = self.gains;
-        if rotor.turn == RENEW_TURN {
-            self.renew(found, rotor.tilt);
+        if turn == RENEW_TURN {
+            self.renew(found, tilt);
         } else if let Some(index) = self.index {
             let phase = (rotor.count.wrapping_sub(index).cast_unsigned()).wrapping_mul(plan.phase_per_count);
-            if rotor.turn.is_multiple_of(2) {
-                self.waves = -at_gain(sum(&found.angle, phase), angle);
+            if turn.is_multiple_of(2) {
+                self.waves = -at_gain(sum(&plan.angle, phase), angle);
             } else {
-                self.ripple = at_gain(sum(&found.ripple, phase), drive);
+                self.ripple = at_gain(sum(&plan.ripple, phase), drive);
             }
         }
         let way = rotor.count.wrapping_sub(self.count);
@@ -204,13 +223,13 @@ fn rubbing(found: &Compensation, plan: &FeedforwardPlan, speed: MillimetresPerSe
     let is_outwards = speed.0 < I16F16::ZERO;
     let (dry, viscous) =
         if is_outwards { (found.outwards.dry.0, outwards) } else { (found.inwards.dry.0, inwards) };
-    let magnitude = speed.0.saturating_abs();
-    let above = magnitude.saturating_sub(found.rest_speed.0);
+    let speed = magnitude(speed.0);
+    let above = speed.saturating_sub(found.rest_speed.0);
     if above <= I16F16::ZERO {
         return Rubbing { found: dry, given_back: I16F16::ZERO, moves_outwards: None };
     }
     let force =
-        dry.saturating_add(I16F16::from_bits(truncating_product(magnitude.to_bits(), viscous.to_bits(), 30)));
+        dry.saturating_add(I16F16::from_bits(truncating_product(speed.to_bits(), viscous.to_bits(), 30)));
     let given_back = if above >= found.full_speed.0.saturating_sub(found.rest_speed.0) {
         force
     } else {
@@ -229,13 +248,13 @@ fn rubbing(found: &Compensation, plan: &FeedforwardPlan, speed: MillimetresPerSe
 /// once. Never is it more than what was found at this speed.
 fn released(before: I16F16, Rubbing { found, given_back, moves_outwards }: Rubbing) -> I16F16 {
     let has_turned = moves_outwards.is_some_and(|outwards| outwards != before.is_negative());
-    if has_turned || given_back.saturating_abs() >= before.saturating_abs() {
+    let held = magnitude(before);
+    if has_turned || magnitude(given_back) >= held {
         return given_back;
     }
-    let magnitude = before.saturating_abs();
     // A last place more, so that it comes to an end.
-    let less = I16F16::from_bits((magnitude.to_bits() >> RELEASE_PLACES) + 1);
-    let left = magnitude.saturating_sub(less).min(found);
+    let less = I16F16::from_bits((held.to_bits() >> RELEASE_PLACES) + 1);
+    let left = held.saturating_sub(less).min(found);
     if before.is_negative() { -left } else { left }
 }
 
@@ -245,11 +264,9 @@ fn at_gain(force: I16F16, gain: I16F16) -> I16F16 {
 }
 
 /// The sum of waves at a rotor's angle of which 2^32 are a turn.
-fn sum(waves: &[Wave], angle: u32) -> I16F16 {
+fn sum(waves: &[ReadyWave], angle: u32) -> I16F16 {
     waves.iter().take_while(|wave| wave.order != 0).fold(I16F16::ZERO, |sum, wave| {
-        let phase = angle.wrapping_mul(wave.order.into()).wrapping_add(u32::from(wave.phase) << 16);
-        // An amplitude stays below 2^13: two bits are free.
-        let value = upper_half(wave.amplitude.to_bits() << 2, crate::sine::sine(phase).to_bits());
-        sum + I16F16::from_bits(value)
+        let phase = angle.wrapping_mul(wave.order).wrapping_add(wave.phase);
+        sum + I16F16::from_bits(upper_half(wave.amplitude, sine_of(phase).to_bits()))
     })
 }

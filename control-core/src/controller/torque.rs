@@ -32,7 +32,7 @@ impl Core {
                 // Each wall and friction stay below the 125 N of the strongest motor, damping below
                 // 17 N: with 25 mm that fits. Were it ever more, it would be too much, and not the
                 // other way.
-                let torque = saturating_multiply(given.0, self.plan.lever).saturating_neg();
+                let torque = I16F16::ZERO.saturating_sub(saturating_multiply(given.0, self.plan.lever));
                 let before = self.limiter.given().0.saturating_sub(self.feedforward.fed());
                 Some((MillinewtonMetres(self.runaway.steady(torque, before)), limits))
             }
@@ -59,9 +59,10 @@ impl Core {
         tilt: Milliradians,
     ) -> (MillinewtonMetres, Limits) {
         let count = self.previous.unwrap_or_default().0;
-        let rotor = RotorState { count, speed, tilt, turn: self.turn };
+        let rotor = RotorState { count, speed };
         let found = &self.plan.config.device.compensation;
-        let (torque, is_held) = self.feedforward.tick(found, &self.plan.compensation, rotor, wanted);
+        let (torque, is_held) =
+            self.feedforward.tick(found, &self.plan.compensation, rotor, (self.turn, tilt), wanted);
         (MillinewtonMetres(torque), if is_held { limits.with(Limits::PASSIVITY) } else { limits })
     }
 

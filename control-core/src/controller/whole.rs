@@ -1,6 +1,6 @@
 //! The control law as a whole: its core, and the segments that play while it excites.
 
-use super::{AnyOrder, Core, TickInput, TickOutput};
+use super::{AnyOrder, Core, LargeOrder, TickInput, TickOutput};
 use crate::excitation::Segments;
 use crate::plan::Plan;
 use crate::units::Millimetres;
@@ -54,8 +54,14 @@ impl<S: BorrowMut<Segments>> Controller<S> {
     pub fn order(&mut self, order: impl Into<AnyOrder>) {
         match order.into() {
             AnyOrder::Small(order) => self.core.order(self.segments.borrow_mut(), order),
-            AnyOrder::Large(order) => self.core.large_order(self.segments.borrow_mut(), order),
+            AnyOrder::Large(order) => self.large_order(order),
         }
+    }
+
+    /// The same for a large one, which is moved no further on its way.
+    #[inline]
+    pub fn large_order(&mut self, order: LargeOrder) {
+        self.core.large_order(self.segments.borrow_mut(), order);
     }
 
     /// [`super::Order::Heartbeat`], the one that comes while the needle moves.

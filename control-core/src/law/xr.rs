@@ -16,7 +16,7 @@ mod cells;
 mod check;
 mod surface;
 
-use cells::{Cells, Gaps};
+use cells::{Axes, Cells};
 use surface::Surface;
 
 use super::{ForceLimits, Motion, Response, reach};
@@ -84,11 +84,10 @@ pub(crate) struct PreparedTable {
     /// The least force from each knot and cell on: the force on the needle in its track.
     hull: Vec<u16, { MAX_DEPTHS * MAX_CELLS }>,
     knots: usize,
-    /// The number of depths of a knot, and the distance to the next cell's.
-    depth_row: usize,
-    depth_cell: usize,
+    /// Each cell has depths of its own.
+    has_depth_by_cell: bool,
     cells: usize,
-    gaps: Gaps,
+    axes: Axes,
     ruptures: Vec<Rupture, MAX_LAYERS>,
     inverse_stiffness: I16F16,
     walls_that_close: usize,
@@ -140,14 +139,12 @@ impl PreparedTable {
         let has_wall = limits.layers.iter().any(|met| met.layer.wall.is_some());
         let cells = table.cells();
         let knots = table.forces.len() / cells.max(1);
-        let in_each = table.depths.len() > knots;
         let mut prepared = Self {
             hull: hull(&table.forces, cells),
             knots,
-            depth_row: if in_each { cells } else { 1 },
-            depth_cell: usize::from(in_each),
+            has_depth_by_cell: table.depths.len() > knots,
             cells,
-            gaps: Gaps::new(table),
+            axes: Axes::new(table),
             ruptures: Vec::new(),
             inverse_stiffness: I16F16::ONE.saturating_div(table.stiffness.0),
             walls_that_close: usize::from(has_wall),
@@ -173,7 +170,7 @@ impl PreparedTable {
 
     /// Depth of a knot in a cell, 0.01 mm.
     fn depth(&self, table: &ForceTable, knot: usize, cell: usize) -> i32 {
-        let index = knot * self.depth_row + cell * self.depth_cell;
+        let index = if self.has_depth_by_cell { knot * self.cells + cell } else { knot };
         table.depths.get(index).copied().map_or(0, i32::from)
     }
 
@@ -182,11 +179,12 @@ impl PreparedTable {
     fn position(&self, table: &ForceTable, cells: &Cells, near: usize, depth: I16F16) -> Position {
         // 0.01 mm in Q16: beyond the table's deepest knot, nothing changes.
         let depth = depth.to_bits().min(DEEPEST) * 100;
-        let at = |knot: usize| {
-            cells.mix(table.depths.get(knot * self.depth_row..).unwrap_or_default(), self.depth_cell)
-        };
         let last = self.knots.saturating_sub(1);
-        let (from, to) = (at(near), at((near + 1).min(last)));
+        let [from, to] = if self.has_depth_by_cell {
+            cells.mix(self.rows(&table.depths, near))
+        } else {
+            [near, (near + 1).min(last)].map(|knot| self.depth(table, knot, 0) << 16)
+        };
         if depth < from {
             return Position { knot: near.saturating_sub(1), share: if near > 0 { 1 << 16 } else { 0 } };
         }
@@ -196,11 +194,19 @@ impl PreparedTable {
         Position { knot: near, share: share(depth - from, to - from) >> 12 }
     }
 
+    /// The rows of `knot` and of the next, if there is one, in `values`, which has a value for each
+    /// knot and cell.
+    #[inline(always)]
+    fn rows<'a>(&self, values: &'a [u16], knot: usize) -> [&'a [u16]; 2] {
+        let rows = values.get(knot * self.cells..).unwrap_or_default();
+        let Some((from, rest)) = rows.split_at_checked(self.cells) else { return [&[]; 2] };
+        [from, rest.get(..self.cells).unwrap_or(from)]
+    }
+
     /// The force of `forces` at `position`.
     fn force(&self, forces: &[u16], cells: &Cells, position: Position) -> I16F16 {
-        let at = |knot: usize| cells.mix(forces.get(knot * self.cells..).unwrap_or_default(), 1);
-        let next = (position.knot + 1).min(self.knots.saturating_sub(1));
-        let millinewtons = between(at(position.knot), at(next), position.share);
+        let [from, to] = cells.mix(self.rows(forces, position.knot));
+        let millinewtons = between(from, to, position.share);
         // mN to N: by 0.001 in Q40.
         I16F16::from_bits(upper_half(millinewtons, 1_099_511_628) >> 8)
     }
@@ -289,7 +295,7 @@ impl Memory {
     ) -> Response {
         let (fine, steady) = self.way.tick(depth, speed, prepared.count);
         let fine = Millimetres(fine.0.saturating_sub(self.surface.tick()));
-        self.cells.follow(table, &prepared.gaps, steady, met.angle());
+        self.cells.follow(table, &prepared.axes, steady, met.angle());
         if depth.0 < met.top(0) {
             self.anchor.release(fine);
             if depth.0 < met.top(0).saturating_sub(ANOTHER_ENTRY) {

@@ -143,10 +143,9 @@ impl<B: Board> Telemetry<B> {
         self.endpoint.set_interlocks(Interlocks(self.shared.conditions.get().0 & !saving.0));
         self.endpoint.set_fitted(self.shared.fitted());
         // Its hashes for hello and flash take half a millisecond: it pauses as a save does.
-        if !self.save_pauses()
-            && let Some(planned) = self.ends.plans_made.dequeue()
-        {
-            self.endpoint.take_plan(planned);
+        let takes_plan = !self.save_pauses() && self.ends.plans_made.ready();
+        if takes_plan {
+            self.take_plan();
         }
         while let Some(packet) = self.ends.from_pc.dequeue() {
             self.heard_ms = self.shared.supervised_ms.load(Relaxed);
@@ -156,7 +155,8 @@ impl<B: Board> Telemetry<B> {
                 // Its answer waits for nothing that came after it.
                 self.send_frames();
             }
-            self.forward_orders();
+            // It saves nothing: a stop may be in the next packet.
+            self.forward_orders(false);
             self.endpoint.set_ahead(self.ahead());
             if B::cycles().wrapping_sub(entered) >= timing::COMMAND_CYCLES {
                 B::wake_telemetry();
@@ -172,13 +172,9 @@ impl<B: Board> Telemetry<B> {
             self.shared.line.set(&line);
         }
         B::allow_usb(true);
-        self.forward_orders();
-        if self.ends.plans_asked.ready()
-            && let Some(request) = self.endpoint.plan_asked()
-        {
+        self.forward_orders(!takes_plan);
+        if self.ends.plans_asked.ready() && self.ask_for_plan() {
             self.written_ms = ms;
-            // There is room: just seen.
-            let _ = self.ends.plans_asked.enqueue(request);
         }
         self.guard_supply();
         let in_session = self.endpoint.in_session();
@@ -189,6 +185,21 @@ impl<B: Board> Telemetry<B> {
             let _ = self.filling.push(FRAME_END);
         }
         self.in_session = in_session;
+    }
+
+    /// Takes a plan that was made. On its own, because a plan takes much room on the stack.
+    #[inline(never)]
+    fn take_plan(&mut self) {
+        if let Some(planned) = self.ends.plans_made.dequeue() {
+            self.endpoint.take_plan(planned);
+        }
+    }
+
+    /// Passes on what the planner is asked for, if there is anything; it has room.
+    #[inline(never)]
+    fn ask_for_plan(&mut self) -> bool {
+        let Some(request) = self.endpoint.plan_asked() else { return false };
+        self.ends.plans_asked.enqueue(request).is_ok()
     }
 
     /// A stop waits for nothing: what waits before it and gives torque is dropped.
@@ -213,10 +224,12 @@ impl<B: Board> Telemetry<B> {
         self.endpoint.answer_guard(result);
     }
 
-    /// Passes orders on until there are no more or the tick has no room.
-    fn forward_orders(&mut self) {
+    /// Passes orders on until there are no more, the tick has no room, or one is to be saved and
+    /// may not.
+    fn forward_orders(&mut self, may_save: bool) {
+        let may_save = may_save && !(self.saving.is_some() && self.save_pauses());
         // It is large: taking it out and putting it back for each packet takes longer than a line.
-        if self.saving.is_some() && self.save_pauses() {
+        if !may_save && matches!(self.held, Some(AnyOrder::Large(LargeOrder::Configure(_)))) {
             return;
         }
         while let Some(order) = self.held.take().or_else(|| self.endpoint.next_order()) {
@@ -234,7 +247,7 @@ impl<B: Board> Telemetry<B> {
                 AnyOrder::Small(order) => Some(order),
                 AnyOrder::Large(large) => {
                     if let LargeOrder::Configure(plan) = &large
-                        && self.save(plan).is_err()
+                        && (!may_save || self.save(plan).is_err())
                     {
                         self.held = Some(large.into());
                         return;

@@ -159,7 +159,7 @@ impl<B: Board> Tick<B> {
         if matches!(order, LargeOrder::Excite(_) | LargeOrder::Play(_)) {
             return self.power_up(stops, order);
         }
-        self.controller.order(order);
+        self.controller.large_order(order);
         // A plan that came while torque was on has not been taken.
         self.width = self.controller.plan().config().device.dac;
     }

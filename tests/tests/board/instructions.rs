@@ -1,6 +1,7 @@
 //! The cost of a tick in instructions, and the depth of the stack.
 
 use std::collections::BTreeMap;
+use std::ops::RangeInclusive;
 
 use control_core::Config;
 use control_core::compensation::{Compensation, Friction, Gain, Gains, Wave};
@@ -25,8 +26,7 @@ use tests::scenario::{COUNTS_PER_MM, venepuncture};
 /// The tick's interrupt handler.
 pub(super) const TICK: &str = "TIM4";
 /// The limit for a tick of the default patient without compensation: five per cent of its cycles.
-/// 840 are wanted.
-const LONGEST: u32 = 850;
+const LONGEST: u32 = 840;
 /// The same of six walls that are all met, and of excitations.
 const HEAVIEST: u32 = 1_100;
 const EXCITING: u32 = 910;
@@ -34,6 +34,8 @@ const EXCITING: u32 = 910;
 const OTHER_LAWS: u32 = 1_260;
 /// With all that can be fed forward.
 const COMPENSATED: u32 = 1_260;
+/// The largest patients of the other laws on such a device. 1,260 are wanted.
+const BOTH: u32 = 1_480;
 const WORKING: [State; 5] =
     [State::Approach, State::Elastic, State::Puncture, State::Friction, State::Withdrawal];
 /// The time at which the hand begins to move.
@@ -195,7 +197,7 @@ pub(super) fn path(points: impl IntoIterator<Item = (f64, i64)>) -> Vec<(Nanos, 
 }
 
 #[test]
-fn a_tick_takes_at_most_850_instructions() {
+fn a_tick_takes_at_most_840_instructions() {
     let mut profile = Profile::default();
     let end = 8_300 * MILLISECOND;
     let (mut board, _) =
@@ -207,7 +209,7 @@ fn a_tick_takes_at_most_850_instructions() {
     println!("stack_high_water_bytes={used}");
     println!("tick_instructions_longest={longest}");
     assert!(longest <= LONGEST, "a tick of {longest} instructions");
-    assert!(16 * used <= 9 * size, "too much of the stack was used: {used} of {size} bytes");
+    assert!(2 * used <= size, "more than half of the stack was used: {used} of {size} bytes");
 }
 
 #[test]
@@ -222,7 +224,7 @@ fn a_tick_with_all_feedforward_takes_at_most_1260_instructions() {
     let (used, size) = board.stack_use().expect("the image says where its stack is");
     println!("tick_instructions_compensated={longest}");
     assert!(longest <= COMPENSATED, "a tick of {longest} instructions");
-    assert!(16 * used <= 9 * size, "too much of the stack was used: {used} of {size} bytes");
+    assert!(2 * used <= size, "more than half of the stack was used: {used} of {size} bytes");
 }
 
 /// In and out at 100 mm/s and more, with pauses; stopped and started again all the while the needle
@@ -260,36 +262,57 @@ fn a_tick_of_the_heaviest_configurations_takes_no_more() {
     assert!(longest <= HEAVIEST, "a tick of {longest} instructions");
 }
 
-/// In through all layers, with a rest on the way, and out, in as many layers as there may be and in
-/// fewer. Takes more than 5 s: each number of layers on a board of its own.
+/// In through `layers` layers, with a rest on the way, and out; the longest tick.
+fn longest_through(
+    name: &str,
+    (make, layers): (fn(usize) -> Config, RangeInclusive<usize>),
+    compensation: Compensation,
+) -> u32 {
+    let mut profile = Profile::default();
+    for count in layers {
+        let deepest = COUNTS_PER_MM * (6 * count as i64 + 2);
+        let ms = 14.0 * count as f64;
+        let moves = [
+            (0.0, 0),
+            (50.0, -2 * COUNTS_PER_MM),
+            (60.0, -2 * COUNTS_PER_MM),
+            (160.0 + ms, deepest / 2),
+            (200.0 + ms, deepest / 2),
+            (300.0 + 2.0 * ms, deepest),
+            (340.0 + 2.0 * ms, deepest),
+            (460.0 + 6.0 * ms, -2 * COUNTS_PER_MM),
+        ];
+        let hand = plant::by_hand(plant::eased(path(moves)));
+        let end = BEGIN + (480.0 + 6.0 * ms) as u64 * MILLISECOND;
+        let mut config = make(count);
+        config.device.compensation = compensation;
+        profile.add(config, &[Command::Start], hand, end, |_, _| ());
+    }
+    // The table has its walls in it.
+    for state in WORKING.into_iter().filter(|&state| state != State::Puncture || name.starts_with("sparte")) {
+        assert!(profile.by_state.contains_key(&(state as u8)), "{name}: {state:?} was not reached");
+    }
+    profile.longest(name)
+}
+
+/// In as many layers as there may be and in fewer. Takes more than 5 s: each number of layers on a
+/// board of its own.
 #[test]
 fn a_tick_of_the_other_laws_takes_at_most_1260_instructions() {
-    type Make = fn(usize) -> Config;
-    for (name, make, puncture) in [("sparte", laws::sparte as Make, true), ("xr", laws::xr as Make, false)] {
-        let mut profile = Profile::default();
-        for count in 1..=MAX_LAYERS {
-            let deepest = COUNTS_PER_MM * (6 * count as i64 + 2);
-            let ms = 14.0 * count as f64;
-            let moves = [
-                (0.0, 0),
-                (50.0, -2 * COUNTS_PER_MM),
-                (60.0, -2 * COUNTS_PER_MM),
-                (160.0 + ms, deepest / 2),
-                (200.0 + ms, deepest / 2),
-                (300.0 + 2.0 * ms, deepest),
-                (340.0 + 2.0 * ms, deepest),
-                (460.0 + 6.0 * ms, -2 * COUNTS_PER_MM),
-            ];
-            let hand = plant::by_hand(plant::eased(path(moves)));
-            let end = BEGIN + (480.0 + 6.0 * ms) as u64 * MILLISECOND;
-            profile.add(make(count), &[Command::Start], hand, end, |_, _| ());
-        }
-        for state in WORKING.into_iter().filter(|state| puncture || *state != State::Puncture) {
-            assert!(profile.by_state.contains_key(&(state as u8)), "{name}: {state:?} was not reached");
-        }
-        let longest = profile.longest(name);
+    for (name, make) in [("sparte", laws::sparte as fn(usize) -> Config), ("xr", laws::xr)] {
+        let longest = longest_through(name, (make, 1..=MAX_LAYERS), Compensation::NONE);
         println!("tick_instructions_longest_{name}={longest}");
         assert!(longest <= OTHER_LAWS, "{name}: a tick of {longest} instructions");
+    }
+}
+
+/// Their largest patients on a device that has everything to feed forward.
+#[test]
+fn nor_does_one_with_all_feedforward_as_well() {
+    for (name, make) in [("sparte", laws::sparte as fn(usize) -> Config), ("xr", laws::xr)] {
+        let name = format!("{name}, all fed forward");
+        let longest = longest_through(&name, (make, MAX_LAYERS..=MAX_LAYERS), all_fed_forward());
+        assert!(longest <= BOTH, "{name}: a tick of {longest} instructions");
     }
 }
 

@@ -6,6 +6,7 @@ mod commissioning;
 mod compensation;
 mod control;
 mod crash;
+mod edges;
 mod excitations;
 mod faults;
 mod fitted;

@@ -26,6 +26,9 @@ fn a_usb_core_that_stays_in_reset_ends_in_the_watchdog() {
 /// RM0090 12.3.6: what is pending in `EXTI_PR` out of reset is undefined.
 #[test]
 fn an_edge_from_before_the_start_is_no_fault() {
+    let mut board = board_wired(Wiring::default(), plant::held());
+    board.run_ms(50);
+    assert_eq!(board.at_stop(|stopped| stopped.lamps()), [true, false, false], "it runs, and no fault");
     let mut rig = Rig::connected(Wiring::default(), plant::held());
     rig.pc.run_ms(&mut rig.board, 50);
     assert_eq!(rig.pc.heard.hello.as_ref().and_then(|hello| hello.fault), None);

@@ -1,23 +1,61 @@
 //! The cells of a force table around a speed and an angle, and how much each of them counts.
 
 use super::{ForceTable, MAX_ANGLES, MAX_SPEEDS};
+use crate::math::truncating_product;
 use crate::units::{MillimetresPerSecond, Milliradians};
+use heapless::Vec;
 
 /// All of a weight, Q16.
 const WHOLE: u32 = 1 << 16;
 
-/// The values for finding a place among speeds and angles: one over the gap from each knot to the
-/// next, Q24.
+/// The knots of speed and of angle.
 #[derive(Clone, Debug)]
-pub(super) struct Gaps {
-    speed: [i32; MAX_SPEEDS],
-    angle: [i32; MAX_ANGLES],
+pub(super) struct Axes {
+    speed: Axis<MAX_SPEEDS>,
+    angle: Axis<MAX_ANGLES>,
 }
 
-impl Gaps {
+impl Axes {
     /// Returns those of a table that has been checked.
     pub(super) fn new(table: &ForceTable) -> Self {
-        Self { speed: per_gap(speed_knots(table)), angle: per_gap(angle_knots(table)) }
+        let speeds: Vec<i32, MAX_SPEEDS> = table.speeds.iter().map(|speed| speed.0.to_bits()).collect();
+        let angles: Vec<i32, MAX_ANGLES> = table.angles.iter().map(|angle| i32::from(angle.0) << 16).collect();
+        Self { speed: Axis::new(&speeds), angle: Axis::new(&angles) }
+    }
+}
+
+/// Knots, ready for finding a place among them.
+#[derive(Clone, Debug)]
+struct Axis<const N: usize> {
+    /// In Q16, rising; where there are fewer, the largest number.
+    knots: [i32; N],
+    /// One over the gap from each knot to the next, Q24; none for the last: nothing is beyond it.
+    per_gap: [i32; N],
+    last: usize,
+}
+
+impl<const N: usize> Axis<N> {
+    /// Returns that of knots in Q16 that are at least 0.01 apart. Out of line: it takes less flash.
+    #[inline(never)]
+    fn new(knots: &[i32]) -> Self {
+        let mut axis = Self { knots: [i32::MAX; N], per_gap: [0; N], last: knots.len().saturating_sub(1) };
+        for (place, &knot) in axis.knots.iter_mut().zip(knots) {
+            *place = knot;
+        }
+        for (gap, (from, to)) in axis.per_gap.iter_mut().zip(knots.iter().zip(knots.iter().skip(1))) {
+            *gap = ((1_i64 << 40) / i64::from((to - from).max(1))) as i32;
+        }
+        axis
+    }
+
+    /// Returns the place of `at`, which is not negative, in Q16.
+    #[inline(always)]
+    fn place(&self, at: i32) -> Place {
+        let index = self.knots.iter().skip(1).filter(|&&knot| at >= knot).count().min(self.last);
+        let knot = self.knots.get(index).copied().unwrap_or_default();
+        let per_gap = self.per_gap.get(index).copied().unwrap_or_default();
+        let share = truncating_product((at - knot).max(0), per_gap, 24).cast_unsigned();
+        Place { index, next: (index + 1).min(self.last), share }
     }
 }
 
@@ -45,14 +83,14 @@ impl Cells {
     pub(super) fn follow(
         &mut self,
         table: &ForceTable,
-        gaps: &Gaps,
+        axes: &Axes,
         speed: MillimetresPerSecond,
         angle: Milliradians,
     ) {
         match self.turn {
-            0 => self.look_anew(table, gaps, speed, angle),
-            1 => self.speed = speed_place(table, gaps, speed),
-            2 => self.angle = angle_place(table, gaps, angle),
+            0 => self.look_anew(table, axes, speed, angle),
+            1 => self.find_speed(axes, speed),
+            2 => self.find_angle(axes, angle),
             3 => self.weigh(table),
             _ => self.look_at_measured(table),
         }
@@ -65,14 +103,24 @@ impl Cells {
     fn look_anew(
         &mut self,
         table: &ForceTable,
-        gaps: &Gaps,
+        axes: &Axes,
         speed: MillimetresPerSecond,
         angle: Milliradians,
     ) {
-        self.speed = speed_place(table, gaps, speed);
-        self.angle = angle_place(table, gaps, angle);
+        self.find_speed(axes, speed);
+        self.find_angle(axes, angle);
         self.weigh(table);
         self.look_at_measured(table);
+    }
+
+    #[inline(never)]
+    fn find_speed(&mut self, axes: &Axes, speed: MillimetresPerSecond) {
+        self.speed = axes.speed.place(speed.0.saturating_abs().to_bits());
+    }
+
+    #[inline(never)]
+    fn find_angle(&mut self, axes: &Axes, angle: Milliradians) {
+        self.angle = axes.angle.place(i32::from(angle.0) << 16);
     }
 
     #[inline(never)]
@@ -95,15 +143,18 @@ impl Cells {
         self.is_estimated = self.corners.iter().any(is_missing);
     }
 
-    /// Returns the value between those of the cells, Q16; the one of cell `n` is `values[n ·
-    /// stride]`.
+    /// Returns the value between those of the cells, Q16, for each of two rows of equal length,
+    /// which have a value for each cell. Both at once: each cell is looked up once.
     #[inline(always)]
-    pub(super) fn mix(&self, values: &[u16], stride: usize) -> i32 {
-        let weighed =
-            |corner: &Corner| values.get(corner.cell * stride).copied().map_or(0, u32::from) * corner.weight;
-        let sum: u32 = self.corners.iter().map(weighed).sum();
+    pub(super) fn mix(&self, [from, to]: [&[u16]; 2]) -> [i32; 2] {
         // Values are below 2^15, weights add up to 2^16.
-        sum.cast_signed()
+        let mut sums = [0_u32; 2];
+        for corner in &self.corners {
+            if let (Some(&from), Some(&to)) = (from.get(corner.cell), to.get(corner.cell)) {
+                sums = [sums[0] + u32::from(from) * corner.weight, sums[1] + u32::from(to) * corner.weight];
+            }
+        }
+        sums.map(u32::cast_signed)
     }
 
     /// True if a cell that counts was not measured.
@@ -118,49 +169,4 @@ struct Place {
     index: usize,
     next: usize,
     share: u32,
-}
-
-pub(super) fn speed_knots(table: &ForceTable) -> impl Iterator<Item = i32> + Clone {
-    table.speeds.iter().map(|speed| speed.0.to_bits())
-}
-
-pub(super) fn angle_knots(table: &ForceTable) -> impl Iterator<Item = i32> + Clone {
-    table.angles.iter().map(|angle| i32::from(angle.0) << 16)
-}
-
-#[inline(never)]
-fn speed_place(table: &ForceTable, gaps: &Gaps, speed: MillimetresPerSecond) -> Place {
-    place(speed_knots(table), &gaps.speed, speed.0.saturating_abs().to_bits())
-}
-
-#[inline(never)]
-fn angle_place(table: &ForceTable, gaps: &Gaps, angle: Milliradians) -> Place {
-    place(angle_knots(table), &gaps.angle, i32::from(angle.0) << 16)
-}
-
-/// One over the gaps between `knots` in Q16. The last knot's gap does not matter: nothing is beyond
-/// it.
-fn per_gap<const N: usize>(knots: impl Iterator<Item = i32> + Clone) -> [i32; N] {
-    let mut gaps = [0; N];
-    for (gap, (from, to)) in gaps.iter_mut().zip(knots.clone().zip(knots.skip(1))) {
-        *gap = ((1_i64 << 40) / i64::from((to - from).max(1))) as i32;
-    }
-    gaps
-}
-
-/// Returns the place of `at` among `knots` in Q16.
-fn place(knots: impl Iterator<Item = i32>, per_gap: &[i32], at: i32) -> Place {
-    let mut place = Place::default();
-    let mut count = 0;
-    for (knot, per_gap) in knots.zip(per_gap) {
-        count += 1;
-        if at < knot {
-            break;
-        }
-        let share = ((i64::from(at) - i64::from(knot)) * i64::from(*per_gap)) >> 24;
-        // Not negative: the knot is at or below.
-        place = Place { index: count - 1, next: 0, share: share.min(i64::from(WHOLE)) as u32 };
-    }
-    // The walk ends at the knot beyond, where there is one.
-    Place { next: (place.index + 1).min(count.max(1) - 1), ..place }
 }

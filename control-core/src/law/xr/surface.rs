@@ -33,6 +33,10 @@ impl Surface {
     /// One tick: the displacement that counts.
     #[inline]
     pub(crate) fn tick(&mut self) -> I16F16 {
+        // On the board nobody displaces it.
+        if self.left == 0 && self.now == I16F16::ZERO {
+            return I16F16::ZERO;
+        }
         if self.left > 0 {
             self.left -= 1;
         } else {
