@@ -1,5 +1,6 @@
 //! Sentences, pages and files of a finished diagnosis. Nothing here fits.
 
+pub mod axes_page;
 pub(crate) mod check;
 mod decisive_plot;
 pub mod exports;

@@ -110,7 +110,7 @@ pub(crate) fn sentence(report: &Report, kind: Kind) -> String {
 }
 
 /// A force on the held-out recordings as a percentage of the force that moves them.
-fn percent_of_force(report: &Report, force: f64) -> f64 {
+pub(crate) fn percent_of_force(report: &Report, force: f64) -> f64 {
     let whole = report.fit.force_rms.holdout;
     if whole > 0.0 { 100.0 * force / whole } else { 0.0 }
 }

@@ -74,9 +74,10 @@ impl Demo {
         );
         say!("what does the simulation leave out?");
         let diagnose = Diagnose {
-            rig: file("rig.toml"),
+            rig: Some(file("rig.toml")),
             fit: vec![file("fit-a.csv"), file("fit-b.csv")],
             holdout: vec![file("holdout.csv")],
+            all: None,
             effects: None,
             out: folder.clone(),
             export: Vec::new(),

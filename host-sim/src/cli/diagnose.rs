@@ -2,12 +2,13 @@
 
 use clap::Args;
 use device_sim::error::Error;
-use diagnosis::{Made, Request};
+use diagnosis::report::exports::Format;
+use diagnosis::{Made, Outcome, Request};
 use live::progress::Progress;
 use live::{examples, say};
 use sha2::{Digest, Sha256};
 use std::fmt::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::mpsc::{self, RecvTimeoutError};
 use std::time::Duration;
@@ -19,17 +20,22 @@ use std::time::Duration;
 /// ten lines.
 #[derive(Args)]
 #[command(after_help = examples!("Example:
-  host-sim diagnose --rig rig.toml --fit fit.csv --fit fit2.csv --holdout holdout.csv --out /tmp/report"))]
+  host-sim diagnose --rig rig.toml --fit fit.csv --fit fit2.csv --holdout holdout.csv --out /tmp/report
+  host-sim diagnose --all robot --out /tmp/report"))]
 pub(crate) struct Diagnose {
     /// The simulation as its author believes it
-    #[arg(long, value_name = "RIG.toml")]
-    pub(super) rig: PathBuf,
+    #[arg(long, required_unless_present = "all", value_name = "RIG.toml")]
+    pub(super) rig: Option<PathBuf>,
     /// A recording to fit and to choose with; may be repeated
-    #[arg(long, required = true, value_name = "FILE.csv")]
+    #[arg(long, required_unless_present = "all", value_name = "FILE.csv")]
     pub(super) fit: Vec<PathBuf>,
     /// A recording only to judge with; may be repeated
-    #[arg(long, required = true, value_name = "FILE.csv")]
+    #[arg(long, required_unless_present = "all", value_name = "FILE.csv")]
     pub(super) holdout: Vec<PathBuf>,
+    /// Every axis of a machine: the folders in DIR with a rig.toml, as `import --axes` writes them;
+    /// a report each, and one page for all of them
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["rig", "fit", "holdout"])]
+    pub(super) all: Option<PathBuf>,
     /// Your own formulas to search too
     #[arg(long, value_name = "F.toml")]
     pub(super) effects: Option<PathBuf>,
@@ -45,28 +51,37 @@ pub(crate) struct Diagnose {
 impl Diagnose {
     pub(crate) fn run(self) -> Result<(), Error> {
         let formats = super::export::formats(&self.export)?;
-        let request = Request { rig: self.rig, fit: self.fit, holdout: self.holdout, effects: self.effects };
-        let bar = Mutex::new(Progress::new("diagnosing"));
-        let show = |stage: &str, done: f64| {
-            if let Ok(mut bar) = bar.lock() {
-                bar.show(100.0 * done, Some(100.0), &format!("% ({stage})"));
-            }
-        };
-        let mut outcome =
-            while_showing(&bar, || diagnosis::diagnose(&request, &show)).map_err(Error::input)?;
-        drop(bar);
-        outcome.made = Some(made(&request));
-        outcome.write(&self.out).map_err(|cause| {
-            Error::failed(format_args!(
-                "{}: the report cannot be written ({cause}); free some space or choose another --out",
-                self.out.display()
-            ))
-        })?;
-        say!("{}", outcome.summary().trim_end());
-        super::export::write(&outcome.patched_rig, &formats, &self.out)?;
+        if let Some(dir) = self.all {
+            return super::diagnose_all::run(&dir, self.effects, &formats, &self.out);
+        }
+        let rig = self.rig.unwrap_or_default();
+        let request = Request { rig, fit: self.fit, holdout: self.holdout, effects: self.effects };
+        diagnose(&request, &formats, &self.out)?;
         say!("report: {}", self.out.join("report.html").display());
         Ok(())
     }
+}
+
+/// Diagnoses, writes the report into a folder and says what was found.
+pub(super) fn diagnose(request: &Request, formats: &[Format], out: &Path) -> Result<Outcome, Error> {
+    let bar = Mutex::new(Progress::new("diagnosing"));
+    let show = |stage: &str, done: f64| {
+        if let Ok(mut bar) = bar.lock() {
+            bar.show(100.0 * done, Some(100.0), &format!("% ({stage})"));
+        }
+    };
+    let mut outcome = while_showing(&bar, || diagnosis::diagnose(request, &show)).map_err(Error::input)?;
+    drop(bar);
+    outcome.made = Some(made(request));
+    outcome.write(out).map_err(|cause| {
+        Error::failed(format_args!(
+            "{}: the report cannot be written ({cause}); free some space or choose another --out",
+            out.display()
+        ))
+    })?;
+    say!("{}", outcome.summary().trim_end());
+    super::export::write(&outcome.patched_rig, formats, out)?;
+    Ok(outcome)
 }
 
 /// Does some work and meanwhile shows now and then how far it is.

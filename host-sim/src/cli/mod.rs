@@ -8,6 +8,7 @@ mod completions;
 mod confirm;
 mod demo;
 mod diagnose;
+mod diagnose_all;
 mod experiment;
 mod export;
 mod fit_force;

@@ -198,7 +198,7 @@ impl Axes {
     }
 
     /// The labels of a column's axis; empty where its name has none.
-    fn of(&self, column: &Column) -> BTreeSet<String> {
+    pub(super) fn of(&self, column: &Column) -> BTreeSet<String> {
         let words = split_words(column);
         let is_label = |i: usize| {
             let word = &words[i];
