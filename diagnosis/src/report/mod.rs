@@ -8,6 +8,7 @@ mod faults;
 mod form_in_words;
 pub(crate) mod free_form;
 mod html;
+pub mod mjcf_patch;
 pub mod motion_picture;
 pub(crate) mod next_experiment;
 mod notes;
@@ -20,6 +21,7 @@ pub mod simulation_page;
 mod summary;
 pub(crate) mod text;
 mod write;
+mod xml;
 
 pub use crate::io::schema::{
     Both, ByModel, Contending, DataFault, FaultKind, FitTable, FreeForm, Hypothesis, Named, Parameter, Place,

@@ -80,7 +80,7 @@ impl Demo {
             all: None,
             effects: None,
             out: folder.clone(),
-            export: Vec::new(),
+            export: super::export::ExportOptions::default(),
         };
         diagnose.run()?;
         note!(

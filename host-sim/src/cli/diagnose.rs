@@ -1,8 +1,9 @@
 //! `host-sim diagnose`: which physics the simulation leaves out.
 
+use super::export::{ExportOptions, Exports};
 use clap::Args;
 use device_sim::error::Error;
-use diagnosis::report::exports::Format;
+use diagnosis::rig::Rig;
 use diagnosis::{Made, Outcome, Request};
 use live::progress::Progress;
 use live::{examples, say};
@@ -42,28 +43,27 @@ pub(crate) struct Diagnose {
     /// Folder for the report
     #[arg(long, value_name = "DIR")]
     pub(super) out: PathBuf,
-    /// Also write the patched rig for another simulator: mjcf (MuJoCo), urdf or json; may be
-    /// repeated
-    #[arg(long, value_name = "mjcf|urdf|json")]
-    pub(super) export: Vec<String>,
+    #[command(flatten)]
+    pub(super) export: ExportOptions,
 }
 
 impl Diagnose {
     pub(crate) fn run(self) -> Result<(), Error> {
-        let formats = super::export::formats(&self.export)?;
         if let Some(dir) = self.all {
-            return super::diagnose_all::run(&dir, self.effects, &formats, &self.out);
+            return super::diagnose_all::run(&dir, self.effects, &self.export.read(None)?, &self.out);
         }
         let rig = self.rig.unwrap_or_default();
+        let nominal = Rig::read(&rig).map_err(Error::input)?;
+        let exports = self.export.read(Some(&nominal))?;
         let request = Request { rig, fit: self.fit, holdout: self.holdout, effects: self.effects };
-        diagnose(&request, &formats, &self.out)?;
+        diagnose(&request, &exports, &self.out)?;
         say!("report: {}", self.out.join("report.html").display());
         Ok(())
     }
 }
 
 /// Diagnoses, writes the report into a folder and says what was found.
-pub(super) fn diagnose(request: &Request, formats: &[Format], out: &Path) -> Result<Outcome, Error> {
+pub(super) fn diagnose(request: &Request, exports: &Exports, out: &Path) -> Result<Outcome, Error> {
     let bar = Mutex::new(Progress::new("diagnosing"));
     let show = |stage: &str, done: f64| {
         if let Ok(mut bar) = bar.lock() {
@@ -80,7 +80,7 @@ pub(super) fn diagnose(request: &Request, formats: &[Format], out: &Path) -> Res
         ))
     })?;
     say!("{}", outcome.summary().trim_end());
-    super::export::write(&outcome.patched_rig, formats, out)?;
+    exports.write(&outcome.nominal_rig, &outcome.patched_rig, Some(&outcome.report), out)?;
     Ok(outcome)
 }
 

@@ -1,10 +1,10 @@
 //! `host-sim diagnose --all`: every axis of a machine, and one page for all of them.
 
 use super::diagnose::diagnose;
+use super::export::Exports;
 use device_sim::error::Error;
 use diagnosis::Request;
 use diagnosis::report::axes_page::{Row, page};
-use diagnosis::report::exports::Format;
 use live::say;
 use std::path::{Path, PathBuf};
 
@@ -49,7 +49,7 @@ fn request(folder: &Path, effects: Option<&PathBuf>) -> Result<Request, Error> {
     Ok(Request { rig: folder.join("rig.toml"), fit, holdout, effects: effects.cloned() })
 }
 
-pub(super) fn run(dir: &Path, effects: Option<PathBuf>, formats: &[Format], out: &Path) -> Result<(), Error> {
+pub(super) fn run(dir: &Path, effects: Option<PathBuf>, exports: &Exports, out: &Path) -> Result<(), Error> {
     let folders: Vec<PathBuf> =
         listed(dir)?.into_iter().filter(|path| path.join("rig.toml").is_file()).collect();
     if folders.is_empty() {
@@ -64,7 +64,7 @@ pub(super) fn run(dir: &Path, effects: Option<PathBuf>, formats: &[Format], out:
         let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
         say!("axis {name}:");
         let done = request(folder, effects.as_ref())
-            .and_then(|request| diagnose(&request, formats, &out.join(&name)));
+            .and_then(|request| diagnose(&request, exports, &out.join(&name)));
         rows.push(match done {
             Ok(outcome) => Row::of(&name, &outcome),
             Err(cause) => {

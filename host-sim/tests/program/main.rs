@@ -14,6 +14,7 @@ mod commission;
 mod common;
 mod compensate;
 mod demo;
+mod export_into;
 mod fit_force;
 mod force_depth;
 mod glossary;
