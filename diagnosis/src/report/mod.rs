@@ -7,6 +7,7 @@ pub mod exports;
 mod faults;
 mod form_in_words;
 pub(crate) mod free_form;
+mod frequency_plot;
 mod html;
 pub mod mjcf_patch;
 pub mod motion_picture;

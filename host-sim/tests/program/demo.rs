@@ -32,6 +32,51 @@ fn a_demonstration_finds_the_cogging_that_its_rotor_has() {
     assert!(error("patched") < 0.25 * error("refit"), "{said}");
 }
 
+/// The points of a curve by its name, in the first plot of `page` over `of`, in the plot's own
+/// units.
+fn curve(page: &str, of: &str, name: &str) -> Vec<[f64; 2]> {
+    let plot = page.split("<svg ").find(|svg| svg.contains(of)).unwrap_or_else(|| panic!("no plot of {of}"));
+    let plot = plot.split("</svg>").next().expect("it ends");
+    let path = plot.split("<path ").find(|path| path.contains(&format!("data-name=\"{name}\"")));
+    let path = path.unwrap_or_else(|| panic!("{name} is not in the plot of {of}"));
+    let d = path.split("d=\"M").nth(1).and_then(|rest| rest.split('"').next()).expect("points");
+    // "x y" is a point; of "x low V high" and "M x mean H x" the second is a mean.
+    let parts = d.split(['M', 'L']).filter(|part| !part.contains('V'));
+    parts
+        .map(|part| {
+            let mut numbers = part.split([' ', 'H']).map(|x| x.parse::<f64>().expect("a number"));
+            [0; 2].map(|_| numbers.next().expect("two"))
+        })
+        .collect()
+}
+
+/// Distance of two curves, root mean square over the places of the first.
+fn apart(a: &[[f64; 2]], b: &[[f64; 2]]) -> f64 {
+    let near =
+        |x: f64| b.iter().min_by(|p, q| (p[0] - x).abs().total_cmp(&(q[0] - x).abs())).expect("points")[1];
+    (a.iter().map(|[x, y]| (y - near(*x)).powi(2)).sum::<f64>() / a.len() as f64).sqrt()
+}
+
+#[test]
+fn in_the_report_the_found_law_is_nearest_to_the_recording() {
+    let out = folder("demo-plots");
+    run_well(&["demo", "missing", "--no-browser", "--out", text(&out)]);
+    let page = std::fs::read_to_string(out.join("missing/report.html")).expect("it was written");
+    let angle = "residual force, N·m over angle";
+    let of = |name: &str| curve(&page, angle, name);
+    let (law, held_out) = (of("torque periodic in the angle"), of("held out"));
+    assert!(law.len() > 25 && held_out.len() > 25);
+    let rival = of("torque periodic in the angle and proportional to the command");
+    assert!(apart(&held_out, &law) < 0.2 * apart(&held_out, &rival));
+    for quantity in ["magnitude, dB of 1 rad/s per N·m", "phase, degrees"] {
+        let of = |name: &str| curve(&page, &format!("{quantity} over frequency"), name);
+        let recorded = of("recorded");
+        let [before, after] =
+            ["the simulation as it is", "with what was found"].map(|name| apart(&recorded, &of(name)));
+        assert!(after < 0.3 * before, "{quantity}: {after} after, {before} before");
+    }
+}
+
 #[test]
 fn at_one_speed_a_demonstration_cannot_tell() {
     let (said, report) = report("cannot-tell");
