@@ -1,7 +1,7 @@
 //! `host-sim diagnose --all`: every axis of a machine, and one page for all of them.
 
-use super::diagnose::diagnose;
 use super::export::Exports;
+use super::one_diagnosis::diagnose;
 use device_sim::error::Error;
 use diagnosis::Request;
 use diagnosis::report::axes_page::{Row, page};
@@ -23,7 +23,7 @@ fn named(path: &Path, begin: &str) -> bool {
     path.file_name().is_some_and(|name| name.to_string_lossy().starts_with(begin))
 }
 
-/// What a folder holds, by name.
+/// Lists a folder, by name.
 fn listed(dir: &Path) -> Result<Vec<PathBuf>, Error> {
     let entries = std::fs::read_dir(dir).map_err(|cause| {
         Error::input(format_args!("{}: cannot be read ({cause}); check its path", dir.display()))

@@ -16,8 +16,9 @@ pub(super) struct ExportOptions {
     /// repeated
     #[arg(long, value_name = "mjcf|urdf|isaaclab|json")]
     export: Vec<String>,
-    /// With --export mjcf: write into a copy of this model, THEIR-patched.xml next to it, and change
-    /// nothing but one joint and its actuators; the model is taken to be the rig as it was given
+    /// With --export mjcf: write into a copy of this model, THEIR-patched.xml next to it, and
+    /// change nothing but one joint and its actuators; the model is taken to be the rig as it was
+    /// given
     #[arg(long, value_name = "THEIR.xml", requires = "joint", requires = "export")]
     into: Option<PathBuf>,
     /// The joint in THEIR.xml
@@ -25,7 +26,7 @@ pub(super) struct ExportOptions {
     joint: Option<String>,
 }
 
-/// What to export.
+/// The rig's exports.
 pub(super) struct Exports {
     formats: Vec<Format>,
     /// Their model, its text, and the joint in it.

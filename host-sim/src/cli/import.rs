@@ -117,7 +117,8 @@ fn every(text: &str) -> Result<(usize, usize), Error> {
 }
 
 impl Import {
-    pub(crate) fn run(self) -> Result<(), Error> {
+    /// Refuses numbers that no recording has.
+    fn check(&self) -> Result<(), Error> {
         let positive = [
             ("--rate", self.rate),
             ("--counts-per-turn", self.counts_per_turn),
@@ -137,6 +138,11 @@ impl Import {
                 "--split is {split}; it must be from 0.1 to 0.9; 0.6 is usual"
             )));
         }
+        Ok(())
+    }
+
+    pub(crate) fn run(self) -> Result<(), Error> {
+        self.check()?;
         let columns = self.column.iter().map(|text| import::choice(text)).collect::<Result<_, _>>()?;
         let clocks = self.clock.iter().map(|text| import::clock_choice(text)).collect::<Result<_, _>>()?;
         let encodings = self.encoding.iter().map(|text| import::encoding(text)).collect::<Result<_, _>>()?;

@@ -14,6 +14,7 @@ mod export;
 mod fit_force;
 mod import;
 mod man;
+mod one_diagnosis;
 mod recordings;
 mod reproduce;
 mod settle;
