@@ -73,10 +73,13 @@ pub fn log_frame(
     y_label: &str,
 ) -> impl Fn(f64, f64) -> (f64, f64) + use<> {
     let logs = with_size((x.0.log10(), x.1.log10()));
-    let round = |power: i32| [1.0, 2.0, 5.0].map(|part| part * 10_f64.powi(power));
+    let parts: &[f64] =
+        if logs.1 - logs.0 > 1.0 { &[1.0, 2.0, 5.0] } else { &[1.0, 2.0, 3.0, 4.0, 5.0, 7.0] };
+    let round =
+        |power: i32| parts.iter().map(move |part| (part * 10_f64.powi(power), (-power).max(0) as usize));
     let powers = logs.0.floor() as i32..=logs.1.floor() as i32;
-    let inside = powers.flat_map(round).filter(|value| (logs.0..=logs.1).contains(&value.log10()));
-    let ticks = inside.map(|value| (value.log10(), value.to_string())).collect();
+    let inside = powers.flat_map(round).filter(|(value, _)| (logs.0..=logs.1).contains(&value.log10()));
+    let ticks = inside.map(|(value, decimals)| (value.log10(), format!("{value:.decimals$}"))).collect();
     let at = framed(out, logs, y, (x_label, y_label), (ticks, " data-log=10"));
     move |a: f64, b: f64| at(a.log10(), b)
 }
@@ -170,6 +173,29 @@ mod tests {
         let mut out = String::new();
         let _ = frame(&mut out, (0.0, 10.0), (-1e-300, 1e-300), "time, s", "force, N");
         assert!(out.contains("data-y=\"-1e0 1e0\"") && !out.contains("e-30"), "{out}");
+    }
+
+    #[test]
+    fn a_logarithmic_frame_has_round_ticks_at_their_places() {
+        let mut out = String::new();
+        let at = log_frame(&mut out, (0.2, 20.0), (0.0, 1.0), "frequency, Hz", "x");
+        assert!(
+            (at(2.0, 0.0).0 - 0.5 * (LEFT + WIDE - EDGE)).abs() < 1e-9,
+            "the middle is the mean of logarithms"
+        );
+        let labels = |out: &str| -> Vec<String> {
+            let texts = out.split("text-anchor=").skip(1);
+            texts.filter_map(|part| Some(part.split('>').nth(1)?.split('<').next()?.to_owned())).collect()
+        };
+        for wanted in ["0.2", "0.5", "1", "2", "5", "10", "20"] {
+            assert!(labels(&out).contains(&wanted.to_owned()), "{wanted}: {out}");
+        }
+        let mut short = String::new();
+        let _ = log_frame(&mut short, (0.25, 0.8), (0.0, 1.0), "frequency, Hz", "x");
+        assert!(
+            labels(&short).contains(&"0.3".to_owned()) && labels(&short).contains(&"0.7".to_owned()),
+            "{short}"
+        );
     }
 
     #[test]

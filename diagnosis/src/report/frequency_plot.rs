@@ -13,6 +13,8 @@ const COHERENT: f64 = 0.5;
 
 /// A quantity of a band, where it is drawn.
 type Quantity = fn(&Band) -> Option<f64>;
+/// A quantity, its label, and its range where that is known.
+type Plotted<'a> = (Quantity, &'a str, Option<(f64, f64)>);
 
 fn magnitude(band: &Band) -> Option<f64> {
     let [re, im] = band.response;
@@ -52,7 +54,7 @@ pub(super) fn draw(out: &mut String, compared: &Comparison, wanted: &[&str], com
     );
     legend(out, &models.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>());
     let per = format!("magnitude, dB of 1 {}/s per {command_unit}", compared.kind.length());
-    let quantities: [(Quantity, &str, Option<(f64, f64)>); 3] = [
+    let quantities: [Plotted; 3] = [
         (magnitude, &per, None),
         (phase, "phase, degrees", None),
         (coherence, "coherence", Some((0.0, 1.05))),

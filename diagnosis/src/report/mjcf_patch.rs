@@ -205,9 +205,9 @@ impl<'a> Model<'a> {
             number(-2.0 * gap.damping * contact)
         );
         for (section, text) in [("worldbody", body), ("mujoco", tendon)] {
-            let closing =
+            let mut closing =
                 self.tags.iter().filter(|tag| tag.name == section).filter_map(|tag| tag.closing.clone());
-            if let Some(at) = closing.last() {
+            if let Some(at) = closing.next_back() {
                 self.changes.push((at.start..at.start, text));
             }
         }

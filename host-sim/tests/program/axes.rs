@@ -75,6 +75,45 @@ fn axes_of_one_log_are_diagnosed_as_each_is_alone() {
 }
 
 #[test]
+fn columns_belong_to_the_axis_that_their_names_say() {
+    let dir = folder("axes-names");
+    let cases: [(&str, &[&str], [&str; 2]); 3] = [
+        (
+            "t,q1,q2,tau1,tau2",
+            &["--column", "position=q1:rad", "--column", "position=q2:rad"],
+            ["axis-1", "axis-2"],
+        ),
+        (
+            "t,left_knee_pos_rad,left_hip_pos_rad,left_knee_torque_Nm,left_hip_torque_Nm",
+            &[],
+            ["left-knee", "left-hip"],
+        ),
+        (
+            "t,motor_0.position_rad,motor_1.position_rad,motor_0.current_A,motor_1.current_A",
+            &[],
+            ["axis-0", "axis-1"],
+        ),
+    ];
+    for (index, (head, options, names)) in cases.into_iter().enumerate() {
+        let (file, out) = (dir.join(format!("{index}.csv")), dir.join(format!("{index}")));
+        let mut log = format!("{head}\n");
+        for row in 0..800 {
+            let t = f64::from(row) * 5e-3;
+            let [q, p] = [3.0, 2.0].map(|w: f64| (w * t).sin() + 0.2 * (7.0 * t).sin());
+            log += &format!("{t:.4},{q:.6},{p:.6},{:.5},{:.5}\n", (3.0 * t).cos(), 0.5 + (2.0 * t).cos());
+        }
+        std::fs::write(&file, log).expect("written");
+        run_well(&[&["import", text(&file), "--axes", "--out", text(&out)], options].concat());
+        for (name, first) in names.into_iter().zip([1.0, 1.5]) {
+            let csv = read(&out.join(name).join("recording.csv"));
+            let command = csv.lines().nth(1).and_then(|line| line.split(',').nth(1)).expect("a row");
+            let command: f64 = command.parse().expect("a number");
+            assert!((command - first).abs() < 1e-3, "{name}: {command} instead of {first}");
+        }
+    }
+}
+
+#[test]
 fn an_axis_that_cannot_be_diagnosed_is_a_row_too() {
     let dir = folder("axes-failed");
     let (robot, out) = (dir.join("robot"), dir.join("out"));

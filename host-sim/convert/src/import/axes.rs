@@ -2,7 +2,7 @@
 
 use super::role::Role;
 use super::roles::{Choice, Place, columns, handle};
-use super::suggestion::{Axes, suggested};
+use super::suggestion::{Axes, numbered, suggested};
 use super::table::{Column, Log};
 use device_sim::error::Error;
 
@@ -41,8 +41,12 @@ pub(super) fn axes(logs: &[Log], choices: &[Choice]) -> Result<Vec<Axis>, Error>
             && choice.column(logs).is_none_or(|(other, _)| !labels.differ(column(other), column(at)))
     };
     let axis = |((at, position), name): ((Place, Choice), String)| {
-        let others = choices.iter().filter(|choice| of_axis(at, choice)).cloned();
-        Axis { name, columns: std::iter::once(position).chain(others).collect() }
+        let mut columns = vec![position];
+        columns.extend(choices.iter().filter(|choice| of_axis(at, choice)).cloned());
+        if columns.iter().all(|choice| choice.role != Role::Command) {
+            columns.extend(numbered_command(logs, &labels, at));
+        }
+        Axis { name, columns }
     };
     Ok(positions.into_iter().zip(names).map(axis).collect())
 }
@@ -56,16 +60,30 @@ fn positions(logs: &[Log], choices: &[Choice]) -> Vec<(Place, Choice)> {
     }
     let fitting: Vec<(u32, Place)> = columns(logs)
         .filter(|(_, column)| column.has_numbers())
-        .filter_map(|(at, column)| suggested(column).filter(|s| s.0 == Role::Position).map(|s| (s.1, at)))
+        .filter_map(|(at, column)| numbered(column).filter(|s| s.0 == Role::Position).map(|s| (s.1, at)))
         .collect();
     let best = fitting.iter().map(|(rank, _)| *rank).min();
     let choice = |at| Choice { role: Role::Position, name: handle(logs, at), unit: None };
     fitting.iter().filter(|(rank, _)| Some(*rank) == best).map(|(_, at)| (*at, choice(*at))).collect()
 }
 
+/// The one command of the axis at a place whose name says so but for its number, as `tau1` does.
+fn numbered_command(logs: &[Log], labels: &Axes, at: Place) -> Option<Choice> {
+    let position = &logs[at.0].tables[at.1].columns[at.2];
+    let is_command = |column: &Column| {
+        let role = |found: Option<(Role, u32)>| found.map(|(role, _)| role);
+        role(numbered(column)) == Some(Role::Command) && role(suggested(column)).is_none()
+    };
+    let mut found =
+        columns(logs).filter(|(_, column)| is_command(column) && !labels.differ(column, position));
+    let (command, _) = found.next()?;
+    let choice = Choice { role: Role::Command, name: handle(logs, command), unit: None };
+    found.next().is_none().then_some(choice)
+}
+
 /// The name of a column's axis, for a folder.
 fn name(labels: &Axes, column: &Column) -> String {
-    let label = labels.of(column).into_iter().collect::<Vec<_>>().join("-");
+    let label = labels.name(column);
     if label.is_empty() {
         return column.plain.chars().map(|c| if c.is_alphanumeric() { c } else { '-' }).collect();
     }
