@@ -100,8 +100,11 @@ pub fn check_recordings(
     fit: &[Recording],
     holdout: &[Recording],
 ) -> Result<Vec<String>, InputError> {
-    let checked = data_faults::check(rig, fit, holdout);
-    Ok(report::check::sentences(&pipeline::check(rig, &checked, &|_, _| {})?))
+    sentences(rig, &data_faults::check(rig, fit, holdout))
+}
+
+fn sentences(rig: &Rig, checked: &data_faults::Checked) -> Result<Vec<String>, InputError> {
+    Ok(report::check::sentences(&pipeline::check(rig, checked, &|_, _| {})?))
 }
 
 /// Diagnoses recordings that are already read; an error where one cannot be used, as where a unit
@@ -114,6 +117,8 @@ pub fn diagnose_recordings(
 ) -> Result<Outcome, InputError> {
     let checked = data_faults::check(rig, fit, holdout);
     let mut outcome = Outcome::of(pipeline::run(rig, &checked, progress)?);
+    // Where nothing can be learnt, the verdict says it already.
+    outcome.evidence.check = sentences(rig, &checked).unwrap_or_default();
     outcome.report.data_faults = checked.faults;
     progress("done", 1.0);
     Ok(outcome)

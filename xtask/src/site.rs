@@ -50,6 +50,9 @@ pub(crate) fn build() -> Result<PathBuf, Error> {
     for file in ["style.css", "practice.css", "patient.css", "guide.css", "icon.svg"] {
         write(&site, file, &read(&pages.join(file))?)?;
     }
+    let program = built(&["--bin", "host-sim"], "host-sim")?;
+    let mut demo = Command::new(program);
+    shell::run(demo.args(["demo", "missing", "--quiet", "--no-browser", "--out"]).arg(site.join("demo")))?;
     write(&site, "board.css", &read(&top.join(BOARD).join("board.css"))?)?;
     Ok(site.join("index.html"))
 }

@@ -26,6 +26,13 @@ pub enum Cell {
     Text(String),
     /// A number, set flush with others; with its unit.
     Number(String),
+    /// Words that lead to another page.
+    Link {
+        /// The words.
+        text: String,
+        /// The page's address, relative to this one.
+        to: String,
+    },
     /// One of a few words that the eye should find, each kind in its own colour.
     Tag {
         /// Its text.
@@ -97,6 +104,9 @@ impl Sheet {
                 let _ = match cell {
                     Cell::Text(words) => write!(self.body, "<td>{}</td>", safe(words)),
                     Cell::Number(words) => write!(self.body, "<td class=n>{}</td>", safe(words)),
+                    Cell::Link { text, to } => {
+                        write!(self.body, "<td><a href=\"{}\">{}</a></td>", safe(to), safe(text))
+                    }
                     Cell::Tag { text, kind } => {
                         write!(self.body, "<td><span class=\"tag k{kind}\">{}</span></td>", safe(text))
                     }

@@ -24,6 +24,8 @@ const scaleOf = (svg) => {
   const [x0, x1] = numbers(svg.dataset.x), [y0, y1] = numbers(svg.dataset.y);
   const scale = { left, right, top, bottom, from: left, to: right, ySpan: y1 - y0 };
   scale.toX = (px) => x0 + (px - left) / (right - left) * (x1 - x0);
+  /** A place along the axis in words, on a logarithmic one the number itself. */
+  scale.words = (x) => "log" in svg.dataset ? show(10 ** x, 10 ** x) : show(x, scale.xSpan());
   scale.toY = (py) => y1 - (py - top) / (bottom - top) * (y1 - y0);
   scale.xSpan = () => scale.toX(scale.to) - scale.toX(scale.from);
   scale.isWhole = () => scale.from === left && scale.to === right;
@@ -68,7 +70,7 @@ const zoom = (scale, { curves, along, zoomed, labelY }, [from, to]) => {
   zoomed.replaceChildren(...isWhole ? [] : ticks(toX(from), toX(to)).flatMap((value) => {
     const px = left + (value - toX(from)) / scale.xSpan() * (right - left);
     const label = create("text", { x: px, y: labelY, "text-anchor": px > right - 18 ? "end" : "middle" });
-    label.textContent = show(value, scale.xSpan());
+    label.textContent = scale.words(value);
     return [create("line", { class: "grid", x1: px, x2: px, y1: bottom + 1, y2: bottom + 6 }), label];
   }));
 };
@@ -107,7 +109,7 @@ const cursorOf = (svg, scale) => {
     const px = scale.whole(shown);
     for (const [key, value] of [["x1", shown], ["x2", shown], ["y1", scale.top], ["y2", scale.bottom]]) line.setAttribute(key, value);
     svg.append(line);
-    readout.textContent = [`${name} ${show(scale.toX(px), scale.xSpan())} ${unit}`, ...valuesAt(curves, px, scale)].join(" · ");
+    readout.textContent = [`${name} ${scale.words(scale.toX(px))} ${unit}`, ...valuesAt(curves, px, scale)].join(" · ");
   };
   return { moveTo, hide };
 };

@@ -58,11 +58,45 @@ pub fn frame(
     x_label: &str,
     y_label: &str,
 ) -> impl Fn(f64, f64) -> (f64, f64) + use<> {
+    let x = with_size(x);
+    let along = round_step((x.1 - x.0) / TICKS);
+    let ticks = ticks(x.0, x.1, along).into_iter().map(|value| (value, label(value, along))).collect();
+    framed(out, x, y, (x_label, y_label), (ticks, ""))
+}
+
+/// The same over the logarithm of a range above zero.
+pub fn log_frame(
+    out: &mut String,
+    x: (f64, f64),
+    y: (f64, f64),
+    x_label: &str,
+    y_label: &str,
+) -> impl Fn(f64, f64) -> (f64, f64) + use<> {
+    let logs = with_size((x.0.log10(), x.1.log10()));
+    let parts: &[f64] =
+        if logs.1 - logs.0 > 1.0 { &[1.0, 2.0, 5.0] } else { &[1.0, 2.0, 3.0, 4.0, 5.0, 7.0] };
+    let round =
+        |power: i32| parts.iter().map(move |part| (part * 10_f64.powi(power), (-power).max(0) as usize));
+    let powers = logs.0.floor() as i32..=logs.1.floor() as i32;
+    let inside = powers.flat_map(round).filter(|(value, _)| (logs.0..=logs.1).contains(&value.log10()));
+    let ticks = inside.map(|(value, decimals)| (value.log10(), format!("{value:.decimals$}"))).collect();
+    let at = framed(out, logs, y, (x_label, y_label), (ticks, " data-log=10"));
+    move |a: f64, b: f64| at(a.log10(), b)
+}
+
+/// A frame with the ticks along its level axis, and an attribute for the script.
+fn framed(
+    out: &mut String,
+    x: (f64, f64),
+    y: (f64, f64),
+    (x_label, y_label): (&str, &str),
+    (along, attribute): (Vec<(f64, String)>, &str),
+) -> impl Fn(f64, f64) -> (f64, f64) + use<> {
     let (x_label, y_label) = (safe(x_label), safe(y_label));
-    let (x, y) = (with_size(x), with_size(y));
+    let y = with_size(y);
     let _ = write!(
         out,
-        "<div class=plot><p class=axis>{y_label}</p><svg viewBox=\"0 -{TOP} {WIDE} {}\" role=img data-of=\"{x_label}\" \
+        "<div class=plot><p class=axis>{y_label}</p><svg viewBox=\"0 -{TOP} {WIDE} {}\" role=img{attribute} data-of=\"{x_label}\" \
          data-x=\"{:e} {:e}\" data-y=\"{:e} {:e}\" data-box=\"{LEFT} {} {EDGE} {}\"><title>{y_label} over {x_label}</title>",
         TOP + HIGH + BOTTOM,
         x.0,
@@ -77,7 +111,7 @@ pub fn frame(
         let py = EDGE + (y.1 - b) / (y.1 - y.0).max(1e-300) * (HIGH - 2.0 * EDGE);
         (px, py.clamp(0.0, HIGH))
     };
-    let (up, along) = (round_step((y.1 - y.0) / TICKS), round_step((x.1 - x.0) / TICKS));
+    let up = round_step((y.1 - y.0) / TICKS);
     for value in ticks(y.0, y.1, up) {
         let (_, py) = at(x.0, value);
         let _ = write!(
@@ -88,7 +122,7 @@ pub fn frame(
             label(value, up)
         );
     }
-    for value in ticks(x.0, x.1, along) {
+    for (value, label) in along {
         let (px, _) = at(value, y.0);
         let anchor = if px > WIDE - 24.0 { "end" } else { "middle" };
         let _ = write!(
@@ -96,7 +130,7 @@ pub fn frame(
             "<line class=grid x1={px:.1} x2={px:.1} y1={} y2={HIGH} /><text x={px:.1} y={} text-anchor={anchor}>{}</text>",
             HIGH - 5.0,
             HIGH + 24.0,
-            label(value, along)
+            label
         );
     }
     at
@@ -139,6 +173,29 @@ mod tests {
         let mut out = String::new();
         let _ = frame(&mut out, (0.0, 10.0), (-1e-300, 1e-300), "time, s", "force, N");
         assert!(out.contains("data-y=\"-1e0 1e0\"") && !out.contains("e-30"), "{out}");
+    }
+
+    #[test]
+    fn a_logarithmic_frame_has_round_ticks_at_their_places() {
+        let mut out = String::new();
+        let at = log_frame(&mut out, (0.2, 20.0), (0.0, 1.0), "frequency, Hz", "x");
+        assert!(
+            (at(2.0, 0.0).0 - 0.5 * (LEFT + WIDE - EDGE)).abs() < 1e-9,
+            "the middle is the mean of logarithms"
+        );
+        let labels = |out: &str| -> Vec<String> {
+            let texts = out.split("text-anchor=").skip(1);
+            texts.filter_map(|part| Some(part.split('>').nth(1)?.split('<').next()?.to_owned())).collect()
+        };
+        for wanted in ["0.2", "0.5", "1", "2", "5", "10", "20"] {
+            assert!(labels(&out).contains(&wanted.to_owned()), "{wanted}: {out}");
+        }
+        let mut short = String::new();
+        let _ = log_frame(&mut short, (0.25, 0.8), (0.0, 1.0), "frequency, Hz", "x");
+        assert!(
+            labels(&short).contains(&"0.3".to_owned()) && labels(&short).contains(&"0.7".to_owned()),
+            "{short}"
+        );
     }
 
     #[test]

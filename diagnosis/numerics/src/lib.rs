@@ -9,4 +9,5 @@ pub mod even_grid;
 pub mod golden_section;
 pub mod linear;
 pub mod parallel;
+pub mod spectrum;
 pub mod spread;

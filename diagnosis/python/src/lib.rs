@@ -6,7 +6,7 @@ use convert::import;
 use diagnosis::recording::Recording;
 use diagnosis::rig::Rig;
 use diagnosis::simulation::replay::Beside;
-use diagnosis::{Outcome, diagnose_recordings};
+use diagnosis::{Outcome, check_recordings, diagnose_recordings};
 use pyo3::create_exception;
 use pyo3::exceptions::{PyOSError, PyValueError};
 use pyo3::prelude::*;
@@ -88,6 +88,15 @@ fn diagnose(py: Python, rig: Named, fit: Vec<Named>, holdout: Vec<Named>) -> PyR
     })
 }
 
+/// Says what recordings can and cannot show, a sentence each.
+#[pyfunction]
+fn check(py: Python, rig: Named, fit: Vec<Named>, holdout: Vec<Named>) -> PyResult<Vec<String>> {
+    py.detach(|| {
+        let rig = rig_of(&rig)?;
+        check_recordings(&rig, &recordings(&fit)?, &recordings(&holdout)?).map_err(refused)
+    })
+}
+
 /// Runs a rig under a recording's command: position and velocity from its first row to its last.
 #[pyfunction]
 fn simulate(py: Python, rig: Named, recording: Named) -> PyResult<(Vec<f64>, Vec<f64>)> {
@@ -137,6 +146,7 @@ fn import_recording(
 fn _native(module: &Bound<PyModule>) -> PyResult<()> {
     module.add("InputError", module.py().get_type::<InputError>())?;
     module.add_class::<Diagnosis>()?;
+    module.add_function(wrap_pyfunction!(check, module)?)?;
     module.add_function(wrap_pyfunction!(diagnose, module)?)?;
     module.add_function(wrap_pyfunction!(simulate, module)?)?;
     module.add_function(wrap_pyfunction!(import_recording, module)?)

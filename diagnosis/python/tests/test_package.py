@@ -1,5 +1,7 @@
 """The package on a machine that is made up here, by another integrator than the package's own."""
 
+import ast
+import inspect
 import json
 from pathlib import Path
 
@@ -47,6 +49,29 @@ def frames():
 @pytest.fixture(scope="module")
 def report(frames):
     return nd.diagnose(RIG, fit=frames[:2], holdout=frames[2])
+
+
+def test_a_check_says_what_one_speed_cannot_show(frames):
+    lively = nd.check(RIG, frames[:2], frames[2])
+    assert lively[0].startswith("fit[0]: 12 s at 1000 rows a second"), lively
+    assert not any("one speed" in sentence for sentence in lively), lively
+    # The axis turns evenly under a command that its own friction takes.
+    time_s = np.arange(0.0, 6.0, 1e-3)
+    steady = [pd.DataFrame({"time_s": time_s, "command": 0.4 + 0.02 * np.sin(5 * time_s + seed), "position_counts":
+        np.floor(8.0 * COUNTS * time_s)}) for seed in (1, 2)]
+    assert any("one speed" in sentence for sentence in nd.check(RIG, steady[0], steady[1]))
+    with pytest.raises(nd.InputError):
+        nd.check(RIG, frames[0][:20], frames[1])
+
+
+def test_the_types_list_what_the_package_has():
+    types = ast.parse(Path(nd.__file__).with_suffix(".pyi").read_text()).body
+    typed = {one.name: one for one in types if isinstance(one, (ast.FunctionDef, ast.ClassDef))}
+    assert set(typed) == set(nd.__all__)
+    for name, one in typed.items():
+        if isinstance(one, ast.FunctionDef):
+            listed = [*one.args.args, *filter(None, [one.args.vararg]), *one.args.kwonlyargs]
+            assert [argument.arg for argument in listed] == list(inspect.signature(getattr(nd, name)).parameters), name
 
 
 def test_what_is_missing_is_found_with_its_size(report):

@@ -4,7 +4,8 @@ use super::definition::{
     Allowed, Coupling, EffectLaw, EffectReport, EffectSearch, Factors, Fitted, ForceLaw, Movable, Reported,
     Shown, Span,
 };
-use super::load::{Load, MOST_OF_DRY, Machine, RATIOS, own_friction};
+use super::joint_terms::JointTerms;
+use super::load::{Load, MOST_OF_DRY, Machine, RATIOS, gap_of, own_friction};
 use super::shape::{ShapeKey, shape};
 use super::{Effect, EffectName, State, Subsystem};
 use numerics::golden_section::logarithmic;
@@ -51,6 +52,11 @@ impl EffectLaw for Defined {
     }
     fn coupling(&self) -> Option<Coupling> {
         Some(Coupling::Stiff)
+    }
+    fn add_to_joint(&self, effect: &Effect, joint: &mut JointTerms) -> bool {
+        let Shape { gap, contact_hz } = Shape::of(effect);
+        joint.gap = Some(gap_of(effect, gap, contact_hz, joint.inertia));
+        true
     }
     fn shape_keys(&self) -> &'static [&'static [ShapeKey]] {
         &[Shape::KEYS, Machine::KEYS]

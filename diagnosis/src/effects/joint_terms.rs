@@ -20,6 +20,23 @@ pub(crate) struct JointTerms {
     /// Time between command and force, and time constant of their first-order lag, s.
     pub(crate) delay: f64,
     pub(crate) lag: f64,
+    /// A gap between motor and load.
+    pub(crate) gap: Option<Gap>,
     /// Notes on what a joint and its motor cannot express.
     pub(crate) notes: Vec<String>,
+}
+
+/// A gap between the motor and its load.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Gap {
+    /// rad or m.
+    pub(crate) width: f64,
+    /// Load inertia over motor inertia.
+    pub(crate) ratio: f64,
+    /// Friction of the load alone: its part of what the joint has.
+    pub(crate) load_dry: f64,
+    pub(crate) load_damping: f64,
+    /// Natural frequency of both while a flank touches, Hz, and its damping ratio.
+    pub(crate) contact_hz: f64,
+    pub(crate) damping: f64,
 }

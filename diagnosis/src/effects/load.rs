@@ -10,6 +10,7 @@
 //! command, so that little noise of the measured motion enters, and bounded, so that nothing
 //! drifts.
 
+use super::joint_terms::Gap;
 use super::shape::shape;
 use super::{Effect, State};
 use std::f64::consts::TAU;
@@ -124,6 +125,14 @@ pub(super) const MOST_OF_DRY: f64 = 1.2;
 pub(super) fn own_friction(effect: &Effect) -> f64 {
     let Machine { coast, ratio, .. } = Machine::of(effect);
     coast * ratio / (1.0 + ratio)
+}
+
+/// A gap in the terms of a joint of this inertia.
+pub(super) fn gap_of(effect: &Effect, width: f64, contact_hz: f64, inertia: f64) -> Gap {
+    let Load { ratio, coast, share, viscous, .. } = Load::of(Machine::of(effect));
+    let load = inertia * ratio / (1.0 + ratio);
+    let (load_dry, load_damping) = (load * coast, load * share * viscous);
+    Gap { width, ratio, load_dry, load_damping, contact_hz, damping: DAMPING }
 }
 
 /// Damping of the contact: it bounces once or twice.

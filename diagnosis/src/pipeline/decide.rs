@@ -3,7 +3,7 @@
 
 use super::assess::Assessment;
 use super::contenders::contenders;
-use super::decisive;
+use super::decisive::{self, Decisive};
 use super::diagnosis::{
     Complete, Diagnosis, FreeForce, JudgedHypothesis, Moved, NamedEffect, Reason, Rigs, Series,
 };
@@ -16,6 +16,7 @@ use crate::effects::EffectName;
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::filter::Noise;
 use crate::estimation::force_residual::Estimator;
+use crate::estimation::noise::Colour;
 use crate::estimation::nominal::{Kept, Key, Nominal};
 use crate::estimation::skew;
 use crate::io::recording::Recording;
@@ -66,11 +67,7 @@ pub(crate) fn decide(
     let is_open = |(name, _): &(EffectName, NotTested)| effects.iter().all(|one| !one.class.contains(name));
     let untested =
         untested::untested(&prepared.span, &prepared.nominal).into_iter().filter(is_open).collect::<Vec<_>>();
-    let first = effects
-        .first()
-        .and_then(|one| shown.patched.model.effects.iter().find(|effect| effect.name == one.name));
-    let decisive =
-        first.and_then(|effect| decisive::decisive(effect, shown, &assessment.fit, smoothed, estimator));
+    let decisive = decision.decisive(effects.first(), shown);
     let nothing_found = matches!(verdict, Verdict::Unexplained | Verdict::RandomDisturbance);
     Diagnosis::Complete(Box::new(Complete {
         verdict,
@@ -163,6 +160,20 @@ impl Decision<'_> {
             }
         };
         Rigs { nominal: given.clone(), refit: rig_of(refit), patched: rig_of(&shown.patched) }
+    }
+
+    /// The picture of the first named effect, with the nearest rival fitted instead.
+    fn decisive(&self, first: Option<&NamedEffect>, shown: &Shown) -> Option<Decisive> {
+        let Assessment { fit, refit, weighed, holdout, .. } = self.assessment;
+        let name = first?.name;
+        let effect = shown.patched.model.effects.iter().find(|effect| effect.name == name)?;
+        let (context, smoothed) = (self.prepared.context(fit), &holdout.smoothed);
+        let fitted = |model| {
+            let model = context.fit(model, &shown.patched.noise, Colour::White);
+            Shown::new(&context, smoothed, &weighed.estimator, refit, model)
+        };
+        let rival = decisive::nearest_rival(name, weighed, shown, fitted);
+        decisive::decisive(effect, shown, rival.as_ref(), fit, smoothed, &weighed.estimator)
     }
 
     /// The named effects, the one that explains most first.

@@ -4,9 +4,12 @@
 use crate::effects::{Effect, EffectName};
 use crate::estimation::blocked_recording::BlockedRecording;
 use crate::estimation::force_residual::Estimator;
+use crate::estimation::model::Model;
+use crate::validation::acceptance_criteria::Rival;
 use crate::validation::comparison::Shown;
 use crate::validation::residual_maps::variable as variable_of;
 use crate::validation::residuals::Residuals;
+use crate::validation::weighed_model::WeighedModel;
 
 /// Bins over the state.
 const BINS: usize = 32;
@@ -41,16 +44,71 @@ pub struct Decisive {
     pub held_out: Vec<Option<Bin>>,
     /// The force that the named laws take of it, on the fitted recordings.
     pub law: Vec<Option<f64>>,
+    /// The effect that comes nearest, fitted in place of this one.
+    pub rival: Option<RivalLaw>,
 }
 
-/// One block: the state, what the refit leaves, and what the laws take of that.
-type Row = (f64, f64, f64);
+/// An effect in place of the named one.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RivalLaw {
+    /// Its name.
+    pub name: EffectName,
+    /// Log-likelihood by which it is behind on held-out recordings, nats.
+    pub behind: f64,
+    /// The force that the laws with it take of the residual, as in [`Decisive::law`].
+    pub law: Vec<Option<f64>>,
+}
+
+/// One block: the state, what the refit leaves, and what the laws and those with the rival take of
+/// that.
+type Row = (f64, f64, f64, f64);
+
+/// Fits the model with the nearest rival instead of a named effect; none where no other effect
+/// was fitted instead.
+pub(crate) fn nearest_rival<'a>(
+    name: EffectName,
+    weighed: &'a WeighedModel,
+    shown: &Shown,
+    fitted: impl Fn(Model) -> Shown,
+) -> Option<(&'a Rival, Shown)> {
+    let found = &weighed.effects.iter().find(|one| one.found.effect.name == name)?.found;
+    let mut model = shown.patched.model.clone();
+    let is_new = |rival: &&Rival| model.effects.iter().all(|effect| effect.name != rival.name);
+    let nearest = found.rivals.iter().filter(is_new).min_by(|a, b| a.z.total_cmp(&b.z))?;
+    *model.effects.iter_mut().find(|effect| effect.name == name)? = nearest.effect.clone();
+    Some((nearest, fitted(model)))
+}
+
+/// The state of a picture.
+struct State<'a> {
+    variable: &'static str,
+    period: Option<f64>,
+    estimator: &'a Estimator,
+}
+
+impl State<'_> {
+    /// The blocks that move.
+    fn rows(&self, tracks: &[BlockedRecording], of: &Residuals, rival: Option<&Residuals>) -> Vec<Row> {
+        let one = |(r, track): (usize, &BlockedRecording)| -> Vec<Row> {
+            let moving = self.estimator.moving(track);
+            let state = variable_of(track, self.variable, self.period);
+            let taken = |by: &Residuals, j: usize| of.refit[r][j] - by.patched[r][j];
+            let row = |j: usize| {
+                (state[j], of.refit[r][j], taken(of, j), rival.map_or(0.0, |rival| taken(rival, j)))
+            };
+            let rows: Vec<Row> = (0..state.len()).filter(|j| moving[*j]).map(row).collect();
+            self.period.map_or_else(|| rows.clone(), |period| in_phase(&rows, period))
+        };
+        tracks.iter().enumerate().flat_map(one).collect()
+    }
+}
 
 /// The picture for an effect of a shown model; none where too little moves, or where the state says
 /// less than half of what the laws take: a delay shows over no state.
 pub(crate) fn decisive(
     effect: &Effect,
     shown: &Shown,
+    rival: Option<&(&Rival, Shown)>,
     fit: &[BlockedRecording],
     holdout: &[BlockedRecording],
     estimator: &Estimator,
@@ -58,17 +116,9 @@ pub(crate) fn decisive(
     let variable = effect.name.definition().variable();
     let slowest = effect.waves().first().map(|(_, waves)| std::f64::consts::TAU / waves.abs());
     let period = slowest.filter(|period| variable == "angle" && period.is_finite());
-    let rows = |tracks: &[BlockedRecording], of: &Residuals| -> Vec<Row> {
-        let one = |(r, track): (usize, &BlockedRecording)| -> Vec<Row> {
-            let moving = estimator.moving(track);
-            let state = variable_of(track, variable, period);
-            let row = |j: usize| (state[j], of.refit[r][j], of.refit[r][j] - of.patched[r][j]);
-            let rows: Vec<Row> = (0..state.len()).filter(|j| moving[*j]).map(row).collect();
-            period.map_or_else(|| rows.clone(), |period| in_phase(&rows, period))
-        };
-        tracks.iter().enumerate().flat_map(one).collect()
-    };
-    let (fitted, held_out) = (rows(fit, &shown.on_fit), rows(holdout, &shown.on_holdout));
+    let state = State { variable, period, estimator };
+    let fitted = state.rows(fit, &shown.on_fit, rival.map(|(_, shown)| &shown.on_fit));
+    let held_out = state.rows(holdout, &shown.on_holdout, None);
     let mut states: Vec<f64> = fitted.iter().map(|row| row.0).collect();
     states.sort_by(f64::total_cmp);
     let end = |part: f64| states.get((part * states.len().saturating_sub(1) as f64) as usize).copied();
@@ -85,8 +135,15 @@ pub(crate) fn decisive(
         }
         inside.iter().map(|values| bin(values)).collect()
     };
-    let law: Vec<Option<f64>> =
-        bins(&fitted, |row| row.2).into_iter().map(|bin| bin.map(|bin| bin.mean)).collect();
+    let curve = |value: fn(&Row) -> f64| -> Vec<Option<f64>> {
+        bins(&fitted, value).into_iter().map(|bin| bin.map(|bin| bin.mean)).collect()
+    };
+    let law = curve(|row| row.2);
+    let rival = rival.map(|(rival, _)| RivalLaw {
+        name: rival.name,
+        behind: rival.held_out_lead,
+        law: curve(|row| row.3),
+    });
     let unsaid = |row: &Row| row.2 - law[place(row)].unwrap_or(0.0);
     let square = |of: &dyn Fn(&Row) -> f64| fitted.iter().map(|row| of(row).powi(2)).sum::<f64>();
     let is_seen = square(&unsaid) < 0.5 * square(&|row| row.2);
@@ -96,6 +153,7 @@ pub(crate) fn decisive(
         period,
         at: (0..BINS).map(|i| low + (i as f64 + 0.5) * width).collect(),
         law,
+        rival,
         fitted: bins(&fitted, |row| row.1),
         held_out: bins(&held_out, |row| row.1),
     })
@@ -114,5 +172,6 @@ fn in_phase(rows: &[Row], period: f64) -> Vec<Row> {
     let turn = std::f64::consts::TAU / period;
     let sum = |wave: fn(f64) -> f64| rows.iter().map(|row| row.2 * wave(turn * row.0)).sum::<f64>();
     let early = sum(f64::cos).atan2(sum(f64::sin)) / turn;
-    rows.iter().map(|(x, left, law)| ((x + early).rem_euclid(period), *left, *law)).collect()
+    let moved = |(x, left, law, rival): &Row| ((x + early).rem_euclid(period), *left, *law, *rival);
+    rows.iter().map(moved).collect()
 }

@@ -1,6 +1,6 @@
 //! The decisive plot, on top of the page.
 
-use crate::pipeline::decisive::{Bin, Decisive};
+use crate::pipeline::decisive::{Bin, Decisive, RivalLaw};
 use crate::report::outcome::Outcome;
 use html_report::drawing::path;
 use html_report::plot::{close, frame};
@@ -22,6 +22,10 @@ pub(super) fn draw(out: &mut String, outcome: &Outcome) {
         plot.variable,
         safe(what)
     );
+    if let Some(rival) = &plot.rival {
+        let _ =
+            write!(out, "<p class=note><i class=\"key rival\"></i> {}.</p>", safe(&sentence(what, rival)));
+    }
     let ends = plot.fitted.iter().chain(&plot.held_out).flatten();
     let top = ends.map(|bin| bin.mean.abs() + bin.spread).fold(1e-300_f64, f64::max);
     let (low, high) = (plot.at[0], plot.at[plot.at.len() - 1]);
@@ -42,8 +46,26 @@ pub(super) fn draw(out: &mut String, outcome: &Outcome) {
     let _ = write!(out, "<path class=\"line law\" data-name=\"{}\" d=\"", safe(what));
     path(out, plot.law.iter().zip(&plot.at).map(|(law, x)| law.map(|law| at(*x, law))));
     out.push_str("\"/>");
+    if let Some(rival) = &plot.rival {
+        let _ = write!(out, "<path class=\"line rival\" data-name=\"{}\" d=\"", safe(rival.name.in_words()));
+        path(out, rival.law.iter().zip(&plot.at).map(|(law, x)| law.map(|law| at(*x, law))));
+        out.push_str("\"/>");
+    }
     close(out, &label);
     out.push_str("</section>");
+}
+
+/// The nearest rival in one sentence, without its full stop.
+fn sentence(winner: &str, rival: &RivalLaw) -> String {
+    let name = rival.name.in_words();
+    if rival.behind > 0.0 {
+        format!(
+            "The nearest rival, {name}, explains the held-out recordings less well than {winner}, by {} nats of log-likelihood",
+            short(rival.behind)
+        )
+    } else {
+        format!("The nearest rival, {name}, explains the held-out recordings as well as {winner}")
+    }
 }
 
 /// A bar from one standard deviation below the mean to one above, with a tick at the mean.

@@ -13,6 +13,8 @@ pub enum Format {
     Mjcf,
     /// The Unified Robot Description Format.
     Urdf,
+    /// Settings of an actuator of Isaac Lab, in Python.
+    IsaacLab,
     /// Everything, for a program of one's own.
     Json,
 }
@@ -23,6 +25,7 @@ impl Format {
         match name {
             "mjcf" => Some(Self::Mjcf),
             "urdf" => Some(Self::Urdf),
+            "isaaclab" => Some(Self::IsaacLab),
             "json" => Some(Self::Json),
             _ => None,
         }
@@ -33,6 +36,7 @@ impl Format {
         match self {
             Self::Mjcf => "patched-rig.xml",
             Self::Urdf => "patched-rig.urdf",
+            Self::IsaacLab => "patched_rig_isaaclab.py",
             Self::Json => "patched-rig.json",
         }
     }
@@ -43,6 +47,7 @@ pub fn export(rig: &Rig, format: Format) -> String {
     match format {
         Format::Mjcf => mjcf(rig),
         Format::Urdf => urdf(rig),
+        Format::IsaacLab => isaac_lab(rig),
         Format::Json => json(rig),
     }
 }
@@ -59,7 +64,7 @@ fn numbers(effect: &Effect) -> String {
 }
 
 /// A rig in the terms of a joint and its motor.
-fn joint_of(rig: &Rig) -> JointTerms {
+pub(super) fn joint_of(rig: &Rig) -> JointTerms {
     let model = &rig.model;
     let mut joint = JointTerms {
         inertia: model.inertia,
@@ -97,8 +102,22 @@ fn joint_of(rig: &Rig) -> JointTerms {
     joint
 }
 
+/// A rig as one joint, which has no room for a gap.
+fn one_joint(rig: &Rig) -> JointTerms {
+    let mut joint = joint_of(rig);
+    if let Some(gap) = joint.gap.take() {
+        joint.notes.push(format!(
+            "a gap of {:.6e} {} between motor and load, with load inertia over motor inertia {:.6e}: --export mjcf --into has it",
+            gap.width,
+            rig.kind.length(),
+            gap.ratio
+        ));
+    }
+    joint
+}
+
 /// Text that is valid in XML, and in its comments.
-fn xml(text: &str) -> String {
+pub(super) fn xml(text: &str) -> String {
     html_report::safe(text).replace("--", "– ")
 }
 
@@ -112,7 +131,7 @@ fn notes(out: &mut String, joint: &JointTerms) {
 const TIMESTEP_S: f64 = 2e-4;
 
 fn mjcf(rig: &Rig) -> String {
-    let joint = joint_of(rig);
+    let joint = one_joint(rig);
     let mut out = String::new();
     let _ = writeln!(out, "<mujoco model=\"{}\">", xml(&rig.name));
     let _ = writeln!(
@@ -168,7 +187,7 @@ fn mjcf(rig: &Rig) -> String {
 }
 
 fn urdf(rig: &Rig) -> String {
-    let mut joint = joint_of(rig);
+    let mut joint = one_joint(rig);
     let unit = rig.kind.force();
     joint.notes.push(format!(
         "the drive gives {:.6e} {unit} for one {} of command",
@@ -203,8 +222,41 @@ fn urdf(rig: &Rig) -> String {
     out
 }
 
+/// A function that makes the settings: the links' inertia and the step are the user's.
+fn isaac_lab(rig: &Rig) -> String {
+    let joint = one_joint(rig);
+    let (force, length) = (rig.kind.force(), rig.kind.length());
+    let mut notes = joint.notes.clone();
+    for (value, what) in [
+        (joint.lag, "a lag, in s, of the force behind the command"),
+        (joint.stiffness, "a spring, in force per travel"),
+    ] {
+        if value != 0.0 {
+            notes.push(format!("{what}: {value:.6e}"));
+        }
+    }
+    let notes: String = notes.iter().map(|note| format!("#   {}\n", note.replace('\n', " "))).collect();
+    let limit = joint.limit.map_or("None".to_owned(), |limit| format!("{:e}", (limit * joint.gain).abs()));
+    format!(
+        "\"\"\"Settings of an Isaac Lab actuator, written by host-sim: a rig in {force} and {length}.\"\"\"\n\n\
+         from isaaclab.actuators import DelayedPDActuatorCfg\n\n\
+         # Not in these settings:\n{notes}\
+         INERTIA = {:e}  # of everything that the joint moves\n\
+         FORCE_PER_COMMAND = {:e}\nFORCE_THAT_IS_ALWAYS_THERE = {:e}  # add it to the effort target\n\
+         EFFORT_LIMIT = {limit}\nDELAY_S = {:e}\n\n\n\
+         def actuator(joint: str, dt: float, links_inertia: float = 0.0, stiffness: float = 0.0, damping: float = 0.0):\n    \
+             \"\"\"`dt` is the physics step in s; stiffness and damping are your controller's.\"\"\"\n    \
+             steps = round(DELAY_S / dt)\n    \
+             return DelayedPDActuatorCfg(\n        \
+                 joint_names_expr=[joint], stiffness=stiffness, damping=damping, effort_limit=EFFORT_LIMIT,\n        \
+                 armature=max(INERTIA - links_inertia, 0.0), friction={:e}, dynamic_friction={:e}, viscous_friction={:e},\n        \
+                 min_delay=steps, max_delay=steps,\n    )\n",
+        joint.inertia, joint.gain, joint.bias, joint.delay, joint.dry, joint.dry, joint.viscous
+    )
+}
+
 fn json(rig: &Rig) -> String {
-    let joint = joint_of(rig);
+    let joint = one_joint(rig);
     let value = serde_json::json!({
         "format": 1,
         "rig": rig,

@@ -7,6 +7,7 @@ use crate::io::schema::{Hypothesis, Named, Verdict};
 use crate::report::decisive_plot;
 use crate::report::faults;
 use crate::report::free_form;
+use crate::report::frequency_plot;
 use crate::report::motion_picture;
 use crate::report::outcome::{Outcome, unit};
 use crate::report::residual_plots::{over_states, over_time};
@@ -30,6 +31,9 @@ pub(crate) fn page(outcome: &Outcome) -> String {
         short_notes(outcome)
     );
     decisive_plot::draw(&mut out, outcome);
+    if let Some(first) = outcome.evidence.simulated.first() {
+        frequency_plot::draw(&mut out, first, shown(outcome), &outcome.nominal_rig.actuator.command_unit);
+    }
     motion(&mut out, outcome);
     if r.verdict != Verdict::InsufficientExcitation {
         numbers(&mut out, outcome);
@@ -42,6 +46,7 @@ pub(crate) fn page(outcome: &Outcome) -> String {
         hypotheses(&mut out, outcome);
         remains(&mut out, outcome);
     }
+    check(&mut out, outcome);
     next(&mut out, outcome);
     footer(&mut out, outcome);
     simulation_page::whole(&format!("Diagnosis: {}", outcome.evidence.rig), &out)
@@ -55,12 +60,29 @@ fn short_notes(outcome: &Outcome) -> String {
     faults.chain(notes).map(|(what, text)| format!("<dt>{what}</dt><dd>{}.</dd>", safe(&text))).collect()
 }
 
+/// Lists the limits of what the recordings can show, folded.
+fn check(out: &mut String, outcome: &Outcome) {
+    if outcome.evidence.check.is_empty() {
+        return;
+    }
+    out.push_str("<details><summary>What these recordings can and cannot show</summary><ul>");
+    for sentence in &outcome.evidence.check {
+        let _ = write!(out, "<li>{}.</li>", safe(sentence));
+    }
+    out.push_str("</ul></details>");
+}
+
+/// The models that plots show.
+fn shown(outcome: &Outcome) -> &'static [&'static str] {
+    let found = outcome.evidence.simulated.first().is_some_and(|one| one.figures("patched").is_some());
+    if found { &["nominal", "patched"] } else { &["nominal", "refit"] }
+}
+
 /// The motion that the simulation gives, next to the one that was recorded.
 fn motion(out: &mut String, outcome: &Outcome) {
     let Some(first) = outcome.evidence.simulated.first() else { return };
     let _ = write!(out, "<section><h2>Simulated and recorded: {}, held out</h2>", safe(&first.file));
-    let found = first.figures("patched").is_some();
-    let wanted: &[&str] = if found { &["nominal", "patched"] } else { &["nominal", "refit"] };
+    let wanted = shown(outcome);
     motion_picture::in_windows(out, first, wanted);
     motion_picture::table(out, first);
     motion_picture::free_run(out, first, wanted);

@@ -14,7 +14,7 @@ const POINTS: usize = 900;
 const RATE_HZ: f64 = 1000.0;
 
 /// The class of a model in pictures: its colour.
-fn class(model: &str) -> &'static str {
+pub(super) fn class(model: &str) -> &'static str {
     match model {
         "nominal" => "a",
         "refit" => "b",
@@ -105,7 +105,7 @@ fn picture(out: &mut String, time: &[f64], picture: &Picture) {
     close(out, "time, s");
 }
 
-fn legend(out: &mut String, models: &[&str]) {
+pub(super) fn legend(out: &mut String, models: &[&str]) {
     out.push_str("<p class=note><span><i class=\"key rec\"></i> recorded</span>");
     for model in models {
         let _ = write!(out, " <span><i class=\"key {}\"></i> {}</span>", class(model), safe(words(model)));

@@ -35,6 +35,8 @@ pub struct Evidence {
     pub rig: String,
     /// Rows a second of the slowest recording, where they were looked at.
     pub rate_hz: Option<f64>,
+    /// The limits of what the recordings can show, a sentence each, as [`crate::check`] says it.
+    pub check: Vec<String>,
 }
 
 /// The sources and the program of a report, for its footer.
@@ -110,7 +112,7 @@ pub(crate) fn sentence(report: &Report, kind: Kind) -> String {
 }
 
 /// A force on the held-out recordings as a percentage of the force that moves them.
-fn percent_of_force(report: &Report, force: f64) -> f64 {
+pub(crate) fn percent_of_force(report: &Report, force: f64) -> f64 {
     let whole = report.fit.force_rms.holdout;
     if whole > 0.0 { 100.0 * force / whole } else { 0.0 }
 }
@@ -233,6 +235,7 @@ impl Outcome {
             kind: rig.kind,
             rig: rig.name.clone(),
             rate_hz,
+            check: Vec::new(),
         };
         let nominal = || rig.clone();
         let rigs = Rigs { nominal: nominal(), refit: nominal(), patched: nominal() };
@@ -285,6 +288,7 @@ impl Outcome {
             kind,
             rig: nominal.name.clone(),
             rate_hz: diagnosis.rate_hz,
+            check: Vec::new(),
         };
         let rigs = Rigs { nominal, refit, patched };
         Self { hypotheses: diagnosis.evidence, contending_rigs, ..Self::with_rigs(report, evidence, rigs) }

@@ -1,6 +1,7 @@
 //! Compares several models of one machine with one recording: the error of each, and the motions to
 //! draw.
 
+use super::frequency::FrequencyResponse;
 use super::replay::{Beside, Deviation, Trajectory};
 use super::{Motion, PositionLoop};
 use crate::io::recording::Recording;
@@ -80,6 +81,8 @@ pub struct Comparison {
     pub feedback: Option<PositionLoop>,
     /// In the order given.
     pub models: Vec<Simulated>,
+    /// The responses of the recording and of the models' free runs, where it is long enough.
+    pub response: Option<FrequencyResponse>,
 }
 
 impl Comparison {
@@ -115,9 +118,13 @@ impl Comparison {
             let afresh = (whole > 2.0 * AFRESH_S).then(|| beside.started_every(rig, AFRESH_S));
             Simulated { model: name.clone(), free, afresh, under, force: beside.force(rig), figures }
         };
-        let models = parallel::map_all(models, simulated);
+        let models: Vec<Simulated> = parallel::map_all(models, simulated);
+        let positions: Vec<(&str, &[f64])> =
+            models.iter().map(|m| (m.model.as_str(), &m.free.position[..])).collect();
+        let response =
+            FrequencyResponse::new(recording, &motion, first.encoder.counts_per_unit.recip(), &positions);
         let force = motion.accelerations().iter().map(|a| a * first.model.inertia).collect();
-        Self { file: recording.file.clone(), kind: first.kind, motion, force, feedback, models }
+        Self { file: recording.file.clone(), kind: first.kind, motion, force, feedback, models, response }
     }
 
     /// The figures of a model of this name.

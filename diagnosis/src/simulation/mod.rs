@@ -2,6 +2,7 @@
 
 pub mod comparison;
 mod fitted_loop;
+pub mod frequency;
 mod motion;
 mod plant;
 pub mod replay;

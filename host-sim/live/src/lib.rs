@@ -30,6 +30,7 @@ macro_rules! examples {
 }
 
 mod class;
+mod demonstration;
 mod layers;
 mod outcome;
 pub mod output;

@@ -1,6 +1,7 @@
 //! `host-sim run`: a device, virtual or on a serial port, shown and recorded.
 
 use crate::class::ClassFlags;
+use crate::demonstration;
 use crate::output;
 use crate::progress::Progress;
 use crate::serial::SerialPort;
@@ -350,7 +351,8 @@ fn serve_for_practice(session: Session, address: SocketAddr) -> Result<visualize
         let attempts = debrief::attempts(&Recording::read(file)?, None)?;
         debrief::html(&attempts, &[]).ok_or_else(|| without_insertion(file))
     });
-    let server = visualizer::serve_with_debrief(session, address, write).map_err(Error::failed)?;
+    let server = visualizer::serve_with_reports(session, address, write, demonstration::page)
+        .map_err(Error::failed)?;
     // A page on one address of the network is not on 127.0.0.1.
     if address.ip().is_loopback() || address.ip().is_unspecified() {
         output::page("visualizer", &server.url());

@@ -20,6 +20,7 @@ use std::path::PathBuf;
   host-sim import run1.csv run2.csv --out imported
   host-sim import log.csv --column position=theta:deg --column command=-tau:mNm --out imported
   host-sim import angle.csv torque.csv --column position=angle.csv/value:deg --column command=torque.csv/value:Nm --out imported
+  host-sim import robot.csv --axes --split 0.6 --out robot
   host-sim import log.npz --rate 1000 --split 0.6 --inertia 0.17 --gain 1 --out imported"))]
 pub(crate) struct Import {
     /// Recordings; several files of one run in chronological order, or with different columns
@@ -46,6 +47,10 @@ pub(crate) struct Import {
     /// Row K of every N, where the rows of N axes alternate
     #[arg(long, value_name = "K/N")]
     rows: Option<String>,
+    /// Split the log of a machine into its axes by the names of their columns, a folder each in
+    /// --out, for `diagnose --all`; or give each axis with --column position=NAME
+    #[arg(long)]
+    axes: bool,
     /// Rows per second, if no column has the time
     #[arg(long, value_name = "HZ")]
     rate: Option<f64>,
@@ -112,7 +117,8 @@ fn every(text: &str) -> Result<(usize, usize), Error> {
 }
 
 impl Import {
-    pub(crate) fn run(self) -> Result<(), Error> {
+    /// Refuses numbers that no recording has.
+    fn check(&self) -> Result<(), Error> {
         let positive = [
             ("--rate", self.rate),
             ("--counts-per-turn", self.counts_per_turn),
@@ -132,6 +138,11 @@ impl Import {
                 "--split is {split}; it must be from 0.1 to 0.9; 0.6 is usual"
             )));
         }
+        Ok(())
+    }
+
+    pub(crate) fn run(self) -> Result<(), Error> {
+        self.check()?;
         let columns = self.column.iter().map(|text| import::choice(text)).collect::<Result<_, _>>()?;
         let clocks = self.clock.iter().map(|text| import::clock_choice(text)).collect::<Result<_, _>>()?;
         let encodings = self.encoding.iter().map(|text| import::encoding(text)).collect::<Result<_, _>>()?;
@@ -142,7 +153,7 @@ impl Import {
         });
         let known =
             Known { rate_hz: self.rate, undriven: self.undriven, error_as_command: self.error_as_command };
-        let done = import::import(&Request {
+        let request = Request {
             files: self.files,
             columns,
             clocks,
@@ -158,39 +169,46 @@ impl Import {
             keep: Keep { idle: self.keep_idle, wraps: self.keep_wraps, outliers: self.keep_outliers },
             split: self.split,
             out: self.out.clone(),
-        })?;
-        for note in &done.notes {
-            say!("{note}");
+        };
+        if !self.axes {
+            let done = import::import(&request)?;
+            report(&done);
+            next(&done, &self.out);
+            return Ok(());
         }
-        for file in &done.recordings {
-            let rate = (file.rows - 1) as f64 / file.seconds;
-            say!("{} rows={} seconds={:.3} rate_hz={rate:.1}", file.path.display(), file.rows, file.seconds);
+        for (name, done) in import::import_axes(&request)? {
+            say!("axis {name}:");
+            report(&done);
         }
-        if done.to_fill_in {
-            say!("{}: fill in the values that stand as nan", done.rig.display());
-        }
-        next(&done, &self.out);
+        let out = self.out.display().to_string();
+        note!("next: host-sim diagnose --all {} --out {}", quoted(&out), quoted(&format!("{out}-report")));
         Ok(())
+    }
+}
+
+/// Says what was done.
+fn report(done: &import::Imported) {
+    for note in &done.notes {
+        say!("{note}");
+    }
+    for file in &done.recordings {
+        let rate = (file.rows - 1) as f64 / file.seconds;
+        say!("{} rows={} seconds={:.3} rate_hz={rate:.1}", file.path.display(), file.rows, file.seconds);
+    }
+    if done.to_fill_in {
+        say!("{}: fill in the values that stand as nan", done.rig.display());
     }
 }
 
 /// The command that comes next.
 fn next(done: &import::Imported, out: &std::path::Path) {
-    let paths: Vec<String> = done.recordings.iter().map(|r| r.path.display().to_string()).collect();
-    let holds_out = |path: &&String| path.rsplit('/').next().is_some_and(|name| name.starts_with("holdout"));
-    let (mut held, mut fit): (Vec<&String>, Vec<&String>) = paths.iter().partition(holds_out);
-    if held.is_empty()
-        && fit.len() > 1
-        && let Some(last) = fit.pop()
-    {
-        held.push(last);
-    }
-    if held.is_empty() {
+    let paths = done.recordings.iter().map(|recording| recording.path.clone()).collect();
+    let Some((fit, held)) = super::diagnose_all::parted(paths) else {
         note!("next: another recording, to hold out, or import this one again with --split 0.6");
         return;
-    }
-    let list = |option: &str, files: &[&String]| {
-        files.iter().map(|f| format!(" {option} {}", quoted(f))).collect::<String>()
+    };
+    let list = |option: &str, files: &[PathBuf]| {
+        files.iter().map(|f| format!(" {option} {}", quoted(&f.display().to_string()))).collect::<String>()
     };
     note!(
         "next: host-sim diagnose --rig {}{}{} --out {}",

@@ -36,10 +36,8 @@ pub(crate) struct Simulate {
     /// A recording to fit values to the error of the free run on; may be repeated
     #[arg(long, value_name = "FILE.csv")]
     fit: Vec<PathBuf>,
-    /// Also write the last of the rigs for another simulator: mjcf (MuJoCo), urdf or json; may be
-    /// repeated
-    #[arg(long, value_name = "mjcf|urdf|json")]
-    export: Vec<String>,
+    #[command(flatten)]
+    export: super::export::ExportOptions,
     /// Folder for the files
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -102,8 +100,8 @@ impl Simulate {
     }
 
     pub(crate) fn run(self) -> Result<(), Error> {
-        let formats = super::export::formats(&self.export)?;
         let mut models = models(&self.rig)?;
+        let exports = self.export.read(models.first().map(|(_, rig)| rig))?;
         let recordings = read_all(&self.recording)?;
         let mut notes = Vec::new();
         let last = models.last().map_or_else(String::new, |(name, _)| name.clone());
@@ -124,8 +122,10 @@ impl Simulate {
         let mut files = files(page, &compared, &notes)?;
         files.extend(fitted_rig.map(|rig| ("fitted-rig.toml".to_owned(), rig.to_toml().into_bytes())));
         self.write(&files)?;
-        if let Some((_, last)) = models.last() {
-            super::export::write(last, &formats, &self.out)?;
+        if let [(_, nominal), ..] = &models[..]
+            && let Some((_, last)) = models.last()
+        {
+            exports.write(nominal, last, None, &self.out)?;
         }
         for one in &compared {
             say!("{}.", simulation_page::sentence(one));

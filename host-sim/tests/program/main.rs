@@ -2,6 +2,7 @@
 //! twenty-four.
 
 mod acceptance;
+mod axes;
 mod cannulation;
 mod characterise;
 #[cfg(all(unix, feature = "class"))]
@@ -13,6 +14,7 @@ mod commission;
 mod common;
 mod compensate;
 mod demo;
+mod export_into;
 mod fit_force;
 mod force_depth;
 mod glossary;

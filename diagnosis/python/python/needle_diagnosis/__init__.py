@@ -25,7 +25,7 @@ import pandas as _pandas
 from . import _native
 from ._native import InputError
 
-__all__ = ["Effect", "Imported", "InputError", "Report", "diagnose", "import_recording", "simulate"]
+__all__ = ["Effect", "Imported", "InputError", "Report", "check", "diagnose", "import_recording", "simulate"]
 
 
 @_dataclass(frozen=True)
@@ -110,6 +110,12 @@ def _recordings(recordings, name):
     if isinstance(recordings, (str, _os.PathLike, _pandas.DataFrame, dict)):
         recordings = [recordings]
     return [_recording(one, f"{name}[{place}]") for place, one in enumerate(recordings)]
+
+
+def check(rig, fit, holdout):
+    """Says in a second what recordings can and cannot show, as a list of sentences: rate, resolution, faults of the log, values and
+    effects that cannot be distinguished, with their correlation, and what to record next. Arguments and errors are those of diagnose."""
+    return _native.check(_rig(rig), _recordings(fit, "fit"), _recordings(holdout, "holdout"))
 
 
 def diagnose(rig, fit, holdout):

@@ -2,6 +2,7 @@
 //! was assumed, changed or left out on the way is said. It reads tables and writes the contract's
 //! files; it may not know what is done with them.
 
+mod axes;
 mod clocks;
 mod column_units;
 mod encoder_resolution;
@@ -112,13 +113,38 @@ pub struct Imported {
     pub notes: Vec<String>,
 }
 
+/// Files that are ready to be written.
+struct Ready {
+    rig: Option<String>,
+    recordings: Vec<(String, Rows)>,
+    scale: encoder_resolution::Scale,
+    notes: Vec<String>,
+}
+
 /// Reads, cleans and writes.
 pub fn import(request: &Request) -> Result<Imported, Error> {
+    let (logs, notes) = read(request)?;
+    write(request, ready(request, &logs, notes)?)
+}
+
+/// Does the same for every axis of a machine, each into a folder of its own in `out`; the folders'
+/// names. Nothing is written where one of them cannot be imported.
+pub fn import_axes(request: &Request) -> Result<Vec<(String, Imported)>, Error> {
+    let (logs, notes) = read(request)?;
+    let mut all = Vec::new();
+    for axis in axes::axes(&logs, &request.columns)? {
+        let out = request.out.join(&axis.name);
+        let request = Request { columns: axis.columns, out, ..request.clone() };
+        let ready = ready(&request, &logs, notes.clone())
+            .map_err(|cause| Error::input(format_args!("axis {}: {cause}", axis.name)))?;
+        all.push((axis.name, request, ready));
+    }
+    all.into_iter().map(|(name, request, ready)| Ok((name, write(&request, ready)?))).collect()
+}
+
+/// Reads the files, with what was left out of each.
+fn read(request: &Request) -> Result<(Vec<Log>, Vec<String>), Error> {
     let mut notes = Vec::new();
-    let rig = match &request.rig {
-        Some(path) => Some(Rig::read(path).map_err(Error::input)?),
-        None => None,
-    };
     let paths = folder::files(&request.files)?;
     let mut logs =
         paths.iter().map(|path| file::read(path, request.decimal)).collect::<Result<Vec<_>, _>>()?;
@@ -129,8 +155,17 @@ pub fn import(request: &Request) -> Result<Imported, Error> {
         clocks::prepare(log);
         notes.extend(log.notes.iter().map(|note| format!("{}: {note}", log.file)));
     }
-    roles::check(&logs, &request.columns)?;
-    let wholes = wholes(&logs, request, &mut notes)?;
+    Ok((logs, notes))
+}
+
+/// Cleans the recordings of one axis.
+fn ready(request: &Request, logs: &[Log], mut notes: Vec<String>) -> Result<Ready, Error> {
+    let rig = match &request.rig {
+        Some(path) => Some(Rig::read(path).map_err(Error::input)?),
+        None => None,
+    };
+    roles::check(logs, &request.columns)?;
+    let wholes = wholes(logs, request, &mut notes)?;
     let per_turn =
         request.counts_per_turn.or_else(|| rig.as_ref().map(|rig| rig.encoder.counts_per_unit * TAU));
     let mut all = Vec::new();
@@ -156,13 +191,17 @@ pub fn import(request: &Request) -> Result<Imported, Error> {
         .first()
         .and_then(|f| f.file_stem())
         .map_or_else(String::new, |s| s.to_string_lossy().into());
-    let text = rig.is_none().then(|| writer::rig(&name, first, scale, &request.values));
-    let to_fill_in = text.as_ref().is_some_and(|text| text.contains("= nan"));
-    let named = named(all, request.split);
-    let paths = writer::files(&request.out, text.as_deref(), &named, scale)?;
+    let rig = rig.is_none().then(|| writer::rig(&name, first, scale, &request.values));
+    Ok(Ready { rig, recordings: named(all, request.split), scale, notes })
+}
+
+fn write(request: &Request, ready: Ready) -> Result<Imported, Error> {
+    let Ready { rig, recordings, scale, notes } = ready;
+    let to_fill_in = rig.as_ref().is_some_and(|text| text.contains("= nan"));
+    let paths = writer::files(&request.out, rig.as_deref(), &recordings, scale)?;
     let recordings = paths
         .into_iter()
-        .zip(&named)
+        .zip(&recordings)
         .map(|(path, (_, run))| Written { path, rows: run.time.len(), seconds: run.time[run.time.len() - 1] })
         .collect();
     let rig = request.rig.clone().unwrap_or_else(|| request.out.join("rig.toml"));

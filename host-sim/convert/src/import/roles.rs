@@ -22,7 +22,7 @@ pub struct Choice {
 impl Choice {
     /// The column that it names and the sign that it gives; `None` where it names no column of
     /// `logs`.
-    fn column(&self, logs: &[Log]) -> Option<(Place, f64)> {
+    pub(super) fn column(&self, logs: &[Log]) -> Option<(Place, f64)> {
         let turned = || Some((find(logs, self.name.strip_prefix('-')?)?, -1.0));
         find(logs, &self.name).map(|at| (at, 1.0)).or_else(turned)
     }
@@ -156,7 +156,7 @@ fn is_repeated(logs: &[Log], (log, table, column): Place) -> bool {
 
 /// The name or, where the table has several of that name, the number by which `--column` finds a
 /// column.
-fn handle(logs: &[Log], place: Place) -> String {
+pub(super) fn handle(logs: &[Log], place: Place) -> String {
     let name = || logs[place.0].tables[place.1].columns[place.2].name.clone();
     if is_repeated(logs, place) { number(logs, place).to_string() } else { name() }
 }
@@ -177,7 +177,7 @@ fn sample(values: &[f64]) -> String {
     format!("{}, …", first.join(", "))
 }
 
-fn columns(logs: &[Log]) -> impl Iterator<Item = (Place, &Column)> {
+pub(super) fn columns(logs: &[Log]) -> impl Iterator<Item = (Place, &Column)> {
     logs.iter().enumerate().flat_map(|(l, log)| {
         log.tables.iter().enumerate().flat_map(move |(t, table)| {
             table.columns.iter().enumerate().map(move |(c, column)| ((l, t, c), column))

@@ -167,6 +167,16 @@ fn by_unit(quantity: Quantity) -> Option<(Role, u32)> {
     }
 }
 
+/// A role that a column's name suggests, if need be without the number at its end: `q1`.
+pub(super) fn numbered(column: &Column) -> Option<(Role, u32)> {
+    suggested(column).or_else(|| {
+        let name = column.plain.trim_end_matches(|c: char| c.is_ascii_digit());
+        let is_one = column.plain.len() > name.len() && !name.is_empty() && column.has_numbers();
+        let unit = column.unit;
+        is_one.then(|| suggested(&Column { unit, ..Column::new(name, Vec::new()) }))?
+    })
+}
+
 /// Which columns of a machine with several axes belong to one of them.
 pub(super) struct Axes {
     /// Words by which columns of one role differ.
@@ -180,7 +190,7 @@ impl Axes {
     /// Finds the words by which columns of one role differ.
     pub(super) fn new<'a>(columns: impl Iterator<Item = &'a Column>) -> Self {
         let all: Vec<(Role, Vec<String>)> =
-            columns.filter_map(|c| Some((suggested(c)?.0, split_words(c)))).take(MOST_COMPARED).collect();
+            columns.filter_map(|c| Some((numbered(c)?.0, split_words(c)))).take(MOST_COMPARED).collect();
         let mut labels = BTreeSet::new();
         for (i, (role, a)) in all.iter().enumerate() {
             for (_, b) in all[i + 1..].iter().filter(|(other, b)| other == role && a.len() == b.len()) {
@@ -210,10 +220,18 @@ impl Axes {
         (0..words.len()).filter(|i| is_label(*i)).map(|i| words[i].clone()).collect()
     }
 
-    /// True if the names of two columns say that they belong to different axes.
+    /// True if the names of two columns say that they belong to different axes: each has a label
+    /// that the other does not have, as in `left_knee` and `left_hip`.
     pub(super) fn differ(&self, a: &Column, b: &Column) -> bool {
         let (a, b) = (self.of(a), self.of(b));
-        !a.is_empty() && !b.is_empty() && a.is_disjoint(&b)
+        !a.is_subset(&b) && !b.is_subset(&a)
+    }
+
+    /// The labels of a column's axis, in their order.
+    pub(super) fn name(&self, column: &Column) -> String {
+        let labels = self.of(column);
+        let words = split_words(column).into_iter().filter(|word| labels.contains(word));
+        words.collect::<Vec<_>>().join("-")
     }
 }
 

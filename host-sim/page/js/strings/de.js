@@ -233,6 +233,7 @@ export default {
   "practice.end": "Aufnahme beenden",
   "practice.debrief": "Nachbesprechung",
   "practice.debrief_title": "Zahlen und Bilder der letzten Aufzeichnung, zum Drucken",
+  "practice.diagnosis": "Eine Simulation diagnostiziert: ein Beispiel",
   "practice.attempts": "Versuche, neueste zuerst",
   "practice.goal": "Ziel",
   "practice.time": "Zeit, s",

@@ -233,6 +233,7 @@ export default {
   "practice.end": "End recording",
   "practice.debrief": "Debrief of the recording",
   "practice.debrief_title": "Figures and pictures of the last recording, to print",
+  "practice.diagnosis": "A simulation diagnosed: an example",
   "practice.attempts": "Attempts, newest first",
   "practice.goal": "Goal",
   "practice.time": "Time, s",

@@ -233,6 +233,7 @@ export default {
   "practice.end": "Terminer l’enregistrement",
   "practice.debrief": "Débriefing",
   "practice.debrief_title": "Chiffres et images du dernier enregistrement, à imprimer",
+  "practice.diagnosis": "Une simulation diagnostiquée : un exemple",
   "practice.attempts": "Essais, les plus récents d’abord",
   "practice.goal": "But",
   "practice.time": "Temps, s",

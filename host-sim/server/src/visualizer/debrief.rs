@@ -24,14 +24,22 @@ async fn page(State((session, write)): State<(Session, Debrief)>) -> Response {
         let what = "nothing has been recorded in the page yet; record an insertion first";
         return (StatusCode::NOT_FOUND, what).into_response();
     };
-    match tokio::task::spawn_blocking(move || write(Path::new(&file))).await {
+    // A debrief has its style and its figures in itself.
+    let policy = "default-src 'none'; style-src 'unsafe-inline'; img-src data:";
+    report(move || write(Path::new(&file)), policy).await
+}
+
+/// Makes a page, which may take seconds, and serves it under a policy of its contents.
+pub(super) async fn report(
+    write: impl FnOnce() -> Result<String, Error> + Send + 'static,
+    policy: &'static str,
+) -> Response {
+    match tokio::task::spawn_blocking(write).await {
         Ok(Ok(html)) => {
-            // A report has its style and its figures in itself.
-            let policy = "default-src 'none'; style-src 'unsafe-inline'; img-src data:";
             let headers = [(header::CONTENT_SECURITY_POLICY, policy), (header::CACHE_CONTROL, "no-store")];
             (headers, Html(html)).into_response()
         }
         Ok(Err(error)) => (StatusCode::UNPROCESSABLE_ENTITY, error.to_string()).into_response(),
-        Err(_) => (StatusCode::INTERNAL_SERVER_ERROR, "the debrief could not be made").into_response(),
+        Err(_) => (StatusCode::INTERNAL_SERVER_ERROR, "the report could not be made").into_response(),
     }
 }

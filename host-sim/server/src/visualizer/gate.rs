@@ -2,6 +2,7 @@
 //! the program listens to a network, and with the token that the program printed: it comes once in
 //! the address and then in a cookie.
 
+use super::demonstration;
 use crate::bounded_listener::BoundedListener;
 use axum::extract::connect_info::Connected;
 use axum::extract::{ConnectInfo, Request, State};
@@ -68,7 +69,7 @@ pub(super) async fn pass(
     if peer.ip().is_loopback() {
         // Anybody on this computer may ask for what only shows a page. Only the page itself may ask
         // for what moves or reveals something.
-        let is_free = !matches!(request.uri().path(), "/live" | "/debrief");
+        let is_free = !matches!(request.uri().path(), "/live" | "/debrief" | demonstration::PATH);
         return match is_free || is_own_page(headers, true) {
             true => next.run(request).await,
             false => refuse("only the page of this program may do this"),

@@ -14,13 +14,15 @@
 mod assets;
 mod connection;
 mod debrief;
+mod demonstration;
 mod gate;
 mod server;
 mod shared;
 mod watched;
 
 pub use debrief::Debrief;
-pub use server::{ServeError, Server, serve, serve_guide, serve_watched, serve_with_debrief};
+pub use demonstration::Demonstration;
+pub use server::{ServeError, Server, serve, serve_guide, serve_watched, serve_with_reports};
 pub use watched::{Said, Watch, Watches};
 
 #[cfg(test)]

@@ -3,6 +3,7 @@
 use super::assets::{ASSETS, Asset, CLASS_PAGE, DEVICE_PAGE, GUIDE_PAGE};
 use super::connection;
 use super::debrief::{self, Debrief};
+use super::demonstration::{self, Demonstration};
 use super::gate::{self, Gate, Peer};
 use super::shared::Shared;
 use super::watched::{self, Said, Watched, Watches};
@@ -157,13 +158,15 @@ pub fn serve(session: Session, port: u16) -> Result<Server, ServeError> {
 }
 
 /// The same at any address, with a debrief of the last recording, which `write` makes of its file,
-/// at `/debrief`. Other computers need the token of [`Server::url_for_others`].
-pub fn serve_with_debrief(
+/// at `/debrief`, and the report of a demonstration of the diagnosis. Other computers need the
+/// token of [`Server::url_for_others`].
+pub fn serve_with_reports(
     session: Session,
     address: SocketAddr,
     write: Debrief,
+    demonstrate: Demonstration,
 ) -> Result<Server, ServeError> {
-    let router = debrief::router(session.clone(), write);
+    let router = debrief::router(session.clone(), write).merge(demonstration::router(demonstrate));
     let shared = Shared { session, person: Arc::default() };
     start(address, &DEVICE_PAGE, router.route("/live", get(live).with_state(shared)))
 }
@@ -275,11 +278,17 @@ mod tests {
         let (session, _publisher) = device_sim::session::open(super::super::test_scene());
         let write: Debrief = Arc::new(|_| Ok(String::new()));
         let all = (Ipv4Addr::UNSPECIFIED, 0).into();
-        let server = serve_with_debrief(session, all, write).unwrap();
+        let server = serve_with_reports(session, all, write, || Ok(String::new())).unwrap();
         let from_outside = SocketAddr::from((own, server.port()));
-        for path in
-            ["/", "/main.js", "/live", "/debrief", "/?token=", "/?token=0123456789abcdef0123456789abcdef"]
-        {
+        for path in [
+            "/",
+            "/main.js",
+            "/live",
+            "/debrief",
+            demonstration::PATH,
+            "/?token=",
+            "/?token=0123456789abcdef0123456789abcdef",
+        ] {
             assert!(answer(from_outside, path, "").starts_with("HTTP/1.1 403"), "{path}");
         }
         let url = server.url_for_others().unwrap();
@@ -303,7 +312,8 @@ mod tests {
     fn an_address_of_another_computer_is_one_clear_line() {
         let (session, _publisher) = device_sim::session::open(super::super::test_scene());
         let write: Debrief = Arc::new(|_| Ok(String::new()));
-        let error = serve_with_debrief(session, "192.0.2.7:0".parse().unwrap(), write).unwrap_err();
+        let error = serve_with_reports(session, "192.0.2.7:0".parse().unwrap(), write, || Ok(String::new()))
+            .unwrap_err();
         assert!(matches!(error, ServeError::NoSuchAddress { .. }), "{error}");
         assert!(error.to_string().contains("192.0.2.7") && error.to_string().contains("--listen"), "{error}");
     }
