@@ -27,6 +27,7 @@ mod papers_page;
 mod patients;
 mod plant;
 mod recordings;
+mod relaxation;
 mod safety_page;
 #[cfg(unix)]
 mod serial;
