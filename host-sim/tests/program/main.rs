@@ -2,6 +2,7 @@
 //! twenty-four.
 
 mod acceptance;
+mod bone;
 mod cannulation;
 mod characterise;
 #[cfg(all(unix, feature = "class"))]
