@@ -173,6 +173,18 @@ impl Procedure {
     }
 }
 
+/// The procedure that a patient's file means if it names none.
+pub(crate) const USUAL: &str = "venepuncture";
+/// The one of a page, with its list of steps.
+const PRACTISED: &str = "cannulation";
+
+/// Returns the procedure with which a page begins in a patient: its own, and where its file names
+/// none, a cannulation with its list of steps.
+pub fn of_page(profile: &Profile) -> String {
+    let own = profile.procedure.as_str();
+    if own == USUAL { PRACTISED.to_owned() } else { own.to_owned() }
+}
+
 /// The text of a built-in procedure by its name, or of a file by its path.
 fn text(wanted: &str) -> Result<Text, Error> {
     insertion(wanted).map_or_else(|| named_files::find("procedure", wanted, &BUILT_IN), Ok)
