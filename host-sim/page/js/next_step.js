@@ -81,7 +81,7 @@ function along(g, section, tissue, from, to) {
   g.restore();
 }
 
-/** Where the needle's line meets the vessel or, without one, the deepest layer. */
+/** The place at which the needle's line meets the vessel or, without one, the deepest layer. */
 function ring(g, section, tissue) {
   const layer = tissue.layers.find((one) => one.is_vessel) ?? tissue.layers.at(-1);
   if (!layer || !Number.isFinite(layer.along)) return;

@@ -1,10 +1,10 @@
-// The learner's name and the session on one printable page: who, when, what was passed and why not, the figures, the curve and a line
+// The trainee's name and the session on one printable page: who, when, what was passed and why not, the figures, the curve and a line
 // to sign. The name is kept in this browser only, until it is emptied; nothing of it goes to the server.
 
 import { number, said, t } from "./language.js";
 
 const byId = (id) => document.getElementById(id);
-const KEPT = "learner";
+const KEPT = "trainee";
 /** The figures of an attempt: the key of their heading, the name of the figure, its digits. */
 const FIGURES = [["practice.time", "time_s", 1], ["practice.force", "peak_force_n", 2], ["practice.in_vein", "in_lumen_s", 1]];
 
@@ -12,7 +12,7 @@ export class SessionSheet {
   /** @param {() => { attempts: object[], goal: string, words: string, curve: HTMLCanvasElement }} session what is to be printed */
   constructor(session) {
     this.session = session;
-    this.name = byId("learner");
+    this.name = byId("trainee");
     try {
       this.name.value = localStorage.getItem(KEPT) ?? "";
     } catch {
@@ -54,7 +54,7 @@ export class SessionSheet {
     const date = new Date().toLocaleDateString(document.documentElement.lang, { dateStyle: "long" });
     byId("sheet").replaceChildren(
       make("h1", t("sheet.title")),
-      make("p", `${t("sheet.learner")}: ${this.name.value.trim() || "…………………………"}`),
+      make("p", `${t("sheet.trainee")}: ${this.name.value.trim() || "…………………………"}`),
       make("p", `${t("sheet.date")}: ${date}`),
       make("p", `${t("practice.goal")}: ${goal} (${words})`),
       table,

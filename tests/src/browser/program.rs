@@ -49,8 +49,8 @@ pub struct Program {
 }
 
 impl Program {
-    /// A virtual device with its page at `port` (0: any free one), recorded where that is wanted. The
-    /// scripted hand does a venepuncture: 6 s, and no task.
+    /// A virtual device with its page at `port` (0: any free one), recorded where that is wanted.
+    /// The scripted hand does a venepuncture, 6 s a round.
     pub fn start(path: &Path, port: u16, record: Option<&Path>) -> Result<Self, Error> {
         let port = port.to_string();
         let record =

@@ -97,7 +97,7 @@ pub struct Plant {
     most_shear: f64,
     hand: Hand,
     hand_force: f64,
-    /// Where bone stops the tip, m past the skin.
+    /// The place at which bone stops the tip, m past the skin.
     bone: Option<f64>,
 }
 

@@ -15,7 +15,6 @@ mod tissues;
 
 use crate::error::Error;
 use crate::named_files::{self, Text};
-use crate::procedure::USUAL;
 use crate::session::{Scene, SceneBeside, SceneLayer, SceneNeedle, SceneVessel, Source, tissue_name};
 use control_core::config::{self, Config, Tissue};
 use control_core::units::{FrictionPerMillimetre, JogCompliance, Millimetres, Newtons, Stiffness};
@@ -32,6 +31,9 @@ pub use law::Model;
 use person::Thickness;
 pub use person::{Difficulty, Person, Sex, Site};
 pub(crate) use tissues::TissueName;
+
+/// The procedure of a patient whose file names none.
+pub(crate) const USUAL_PROCEDURE: &str = "venepuncture";
 
 /// The profiles that come with the program.
 pub const BUILT_IN: [(&str, &str); 12] = [
@@ -119,7 +121,7 @@ impl Profile {
             has_vein,
             beside: file.beside,
             body,
-            procedure: file.procedure.unwrap_or_else(|| USUAL.into()),
+            procedure: file.procedure.unwrap_or_else(|| USUAL_PROCEDURE.into()),
             person: file.patient,
             name: file.name,
             entry_rad: file.entry_deg.to_radians(),
