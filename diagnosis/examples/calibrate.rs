@@ -5,7 +5,7 @@
 mod common;
 
 use common::{Random, Setup, record, rig};
-use diagnosis::effects::EffectName;
+use diagnosis::laws::EffectName;
 use diagnosis::report::Named;
 use std::time::Instant;
 

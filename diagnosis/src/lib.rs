@@ -2,38 +2,39 @@
 //! sure that is, and the evidence.
 //!
 //! Given a rig (the nominal simulation) and recordings, [`diagnose`] refits the nominal values,
-//! searches the residual for the effects of [`effects::EffectName`], judges them on recordings that
+//! searches the residual for the effects of [`laws::EffectName`], judges them on recordings that
 //! were not used for fitting, and reports. This crate knows rigs and recordings; it may not know
 //! devices, links or plots of other crates.
 //!
-//! Folders, each using only those before it: `effects` (the laws), `io` (rigs, recordings, the
-//! report's shape), `simulation` (a rig run forward), `data_faults` (faults of the logs),
-//! `estimation` (blocks, filter, noise, fit), `selection` (candidates and their shapes),
-//! `validation` (held-out recordings), `pipeline` (the stages, one after another) and `report`
-//! (sentences, pages and files). `tests/behaviour/layout.rs` checks this, and that no files use
-//! each other in a circle. The numbers that admit or reject a name are in `thresholds`, which every
-//! folder may read.
+//! A diagnosis reads as its folders: `data` (rigs, recordings, the report's shape) is repaired
+//! (`repair`: faults of the logs), effects are proposed (`propose`: candidates and their shapes),
+//! judged (`evidence`: held-out recordings), and one is decided on (`pipeline`, which alone puts the
+//! stages one after another) and reported (`report`: sentences, pages and files). Below them are
+//! `laws` (the effects), `simulation` (a rig run forward) and `fit` (blocks, filter, noise). Each
+//! uses only those before it in the order of `tests/behaviour/layout.rs`, which checks this, and
+//! that no files use each other in a circle. The numbers that admit or reject a name are in
+//! `thresholds`, which every folder may read.
 
 // Matrices are read by row and column.
 #![allow(clippy::needless_range_loop)]
 
-mod data_faults;
-pub mod effects;
-mod estimation;
-mod io;
+mod data;
+mod evidence;
+mod fit;
+pub mod laws;
 mod pipeline;
+mod propose;
+mod repair;
 pub mod report;
-mod selection;
 pub mod simulation;
 mod thresholds;
-mod validation;
 
-pub use io::error::InputError;
-pub use io::{recording, rig};
+pub use data::error::InputError;
+pub use data::{recording, rig};
+pub use evidence::residual_maps::Map;
 pub use pipeline::diagnosis::Series;
 pub use report::outcome::{Evidence, Made, Outcome};
 pub use report::{DataFault, FaultKind, Report, Verdict};
-pub use validation::residual_maps::Map;
 
 use recording::Recording;
 use rig::Rig;
@@ -70,19 +71,19 @@ fn read_all(request: &Request) -> Result<(Rig, Vec<Recording>, Vec<Recording>), 
         let text = std::fs::read_to_string(path).map_err(|cause| {
             InputError::new(format!("{file}: the effects cannot be read ({cause}); check its path"))
         })?;
-        rig.searched = effects::read_effects(&text, &file).map_err(InputError::new)?;
+        rig.searched = laws::read_effects(&text, &file).map_err(InputError::new)?;
     }
     let read =
         |paths: &[PathBuf]| paths.iter().map(|path| Recording::read(path)).collect::<Result<Vec<_>, _>>();
     let (fit, holdout) = (read(&request.fit)?, read(&request.holdout)?);
-    io::sets::check(&rig, &fit, &holdout)?;
+    data::sets::check(&rig, &fit, &holdout)?;
     Ok((rig, fit, holdout))
 }
 
 /// The faults of recordings that are seen before any law is searched, as a diagnosis takes them
 /// out.
 pub fn data_faults(rig: &Rig, fit: &[Recording], holdout: &[Recording]) -> Vec<DataFault> {
-    data_faults::check(rig, fit, holdout).faults
+    repair::check(rig, fit, holdout).faults
 }
 
 /// Reads the files and says what they can and cannot show, a sentence each, before any effect is
@@ -100,10 +101,10 @@ pub fn check_recordings(
     fit: &[Recording],
     holdout: &[Recording],
 ) -> Result<Vec<String>, InputError> {
-    sentences(rig, &data_faults::check(rig, fit, holdout))
+    sentences(rig, &repair::check(rig, fit, holdout))
 }
 
-fn sentences(rig: &Rig, checked: &data_faults::Checked) -> Result<Vec<String>, InputError> {
+fn sentences(rig: &Rig, checked: &repair::Checked) -> Result<Vec<String>, InputError> {
     Ok(report::check::sentences(&pipeline::check(rig, checked, &|_, _| {})?))
 }
 
@@ -115,7 +116,7 @@ pub fn diagnose_recordings(
     holdout: &[Recording],
     progress: &(dyn Fn(&str, f64) + Sync),
 ) -> Result<Outcome, InputError> {
-    let checked = data_faults::check(rig, fit, holdout);
+    let checked = repair::check(rig, fit, holdout);
     let mut outcome = Outcome::of(pipeline::run(rig, &checked, progress)?);
     // Where nothing can be learnt, the verdict says it already.
     outcome.evidence.check = sentences(rig, &checked).unwrap_or_default();

@@ -11,7 +11,7 @@
 //! the place is fitted on its first two fifths, and the rest judges. Rows that hardly move do not
 //! count.
 
-use diagnosis::effects::{Effect, EffectName};
+use diagnosis::laws::{Effect, EffectName};
 use diagnosis::recording::Recording;
 use diagnosis::rig::Rig;
 use diagnosis::simulation::Motion;

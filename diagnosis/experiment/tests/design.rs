@@ -1,6 +1,6 @@
 //! Designs for small cases whose answer is known.
 
-use diagnosis::effects::{Effect, EffectName};
+use diagnosis::laws::{Effect, EffectName};
 use diagnosis::rig::Rig;
 use experiment::{Case, Limits, Prediction, Rival, Signal, design};
 use std::collections::BTreeMap;

@@ -5,20 +5,20 @@ use super::diagnosis::Reason;
 use super::prepare::Prepared;
 use super::search::Found;
 use super::verdict::misfit;
-use crate::estimation::blocked_recording::BlockedRecording;
-use crate::estimation::model::Model;
-use crate::estimation::refit::is_driven;
-use crate::io::schema::FitTable;
-use crate::selection::context::FittedModel;
-use crate::selection::excitation::Excitation;
+use crate::data::schema::FitTable;
+use crate::evidence::comparison::Shown;
+use crate::evidence::confidence_pass::{Scales, weigh};
+use crate::evidence::free_form_check::{self, FreeFormShare, Unnamed};
+use crate::evidence::holdout_set::HoldoutSet;
+use crate::evidence::out_of_library::{self, Foreign};
+use crate::evidence::parameters;
+use crate::evidence::weighed_model::WeighedModel;
+use crate::fit::blocked_recording::BlockedRecording;
+use crate::fit::model::Model;
+use crate::fit::refit::is_driven;
+use crate::propose::context::FittedModel;
+use crate::propose::excitation::Excitation;
 use crate::thresholds::MATERIAL;
-use crate::validation::comparison::Shown;
-use crate::validation::confidence_pass::{Scales, weigh};
-use crate::validation::free_form_check::{self, FreeFormShare, Unnamed};
-use crate::validation::holdout_set::HoldoutSet;
-use crate::validation::out_of_library::{self, Foreign};
-use crate::validation::parameters;
-use crate::validation::weighed_model::WeighedModel;
 
 /// Everything that the decision rests on.
 pub(crate) struct Assessment {

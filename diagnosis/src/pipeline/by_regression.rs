@@ -2,15 +2,15 @@
 
 use super::prepare::Prepared;
 use super::search::{Found, in_its_own_motion};
-use crate::effects::definition::NominalTerm;
-use crate::effects::{Effect, EffectName};
-use crate::estimation::model::Model;
-use crate::estimation::noise::Colour;
-use crate::selection::context::{FitContext, FittedModel};
+use crate::evidence::effect_evidence::gather_evidence;
+use crate::evidence::elimination::StandingModel;
+use crate::evidence::material::{self, Material};
+use crate::fit::model::Model;
+use crate::fit::noise::Colour;
+use crate::laws::definition::NominalTerm;
+use crate::laws::{Effect, EffectName};
+use crate::propose::context::{FitContext, FittedModel};
 use crate::thresholds::MOST_IN_CLASS;
-use crate::validation::effect_evidence::gather_evidence;
-use crate::validation::elimination::StandingModel;
-use crate::validation::material::{self, Material};
 use regression::Hypothesis;
 
 /// The recordings with the effects that the regression names; none where it names nothing that the

@@ -3,19 +3,19 @@
 
 use super::Progress;
 use super::prepare;
-use crate::data_faults::Checked;
-use crate::effects::definition::Shown;
-use crate::effects::{Effect, EffectName};
-use crate::estimation::fit::Fit;
-use crate::estimation::force_residual::Estimator;
-use crate::estimation::model::Model;
-use crate::estimation::nominal::{Kept, Key};
-use crate::io::recording::Recording;
-use crate::io::rig::{Kind, Rig};
-use crate::io::schema::DataFault;
-use crate::selection::excitation::Excitation;
-use crate::selection::untested::{self, NotTested};
-use crate::validation::residuals::{drive_force, forces};
+use crate::data::recording::Recording;
+use crate::data::rig::{Kind, Rig};
+use crate::data::schema::DataFault;
+use crate::evidence::residuals::{drive_force, forces};
+use crate::fit::fit::Fit;
+use crate::fit::force_residual::Estimator;
+use crate::fit::model::Model;
+use crate::fit::nominal::{Kept, Key};
+use crate::laws::definition::Shown;
+use crate::laws::{Effect, EffectName};
+use crate::propose::excitation::Excitation;
+use crate::propose::untested::{self, NotTested};
+use crate::repair::Checked;
 
 /// Correlation of two fitted values from which only their combination shows.
 const ALIKE: f64 = 0.95;

@@ -5,12 +5,12 @@ use super::assess::Assessment;
 use super::diagnosis::Contender;
 use super::patched_rig::patch;
 use super::prepare::Prepared;
-use crate::effects::{Effect, EffectName};
-use crate::estimation::model::Model;
-use crate::estimation::noise::Colour;
-use crate::selection::context::{FitContext, FittedModel};
+use crate::evidence::weighed_model::{WeighedEffect, WeighedModel};
+use crate::fit::model::Model;
+use crate::fit::noise::Colour;
+use crate::laws::{Effect, EffectName};
+use crate::propose::context::{FitContext, FittedModel};
 use crate::thresholds::MOST_IN_CLASS;
-use crate::validation::weighed_model::{WeighedEffect, WeighedModel};
 
 /// Rivals beyond this many standard errors behind are out.
 const OUT_Z: f64 = 4.0;
@@ -122,7 +122,7 @@ impl Field<'_> {
         self.context.fit(model, &self.assessment.weighed.shown.patched.noise, Colour::White)
     }
 
-    fn rig(&self, model: FittedModel) -> crate::io::rig::Rig {
+    fn rig(&self, model: FittedModel) -> crate::data::rig::Rig {
         let Prepared { given, nominal, .. } = self.prepared;
         patch(given, nominal, &self.assessment.fit, &model)
     }

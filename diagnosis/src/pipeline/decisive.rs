@@ -1,15 +1,15 @@
 //! The decisive picture of a name: the force that the refitted simulation leaves, against the state
 //! that the named law acts on, and what the law takes of it.
 
-use crate::effects::{Effect, EffectName};
-use crate::estimation::blocked_recording::BlockedRecording;
-use crate::estimation::force_residual::Estimator;
-use crate::estimation::model::Model;
-use crate::validation::acceptance_criteria::Rival;
-use crate::validation::comparison::Shown;
-use crate::validation::residual_maps::variable as variable_of;
-use crate::validation::residuals::Residuals;
-use crate::validation::weighed_model::WeighedModel;
+use crate::evidence::acceptance_criteria::Rival;
+use crate::evidence::comparison::Shown;
+use crate::evidence::residual_maps::variable as variable_of;
+use crate::evidence::residuals::Residuals;
+use crate::evidence::weighed_model::WeighedModel;
+use crate::fit::blocked_recording::BlockedRecording;
+use crate::fit::force_residual::Estimator;
+use crate::fit::model::Model;
+use crate::laws::{Effect, EffectName};
 
 /// Bins over the state.
 const BINS: usize = 32;

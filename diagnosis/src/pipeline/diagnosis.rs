@@ -2,18 +2,18 @@
 
 use super::decisive::Decisive;
 use super::evidence_table::EvidenceRow;
-use crate::effects::EffectName;
-use crate::estimation::blocked_recording::BlockedRecording;
-use crate::io::rig::Rig;
-use crate::io::schema::{FitTable, Parameter, Place, Simulation, Verdict};
-use crate::selection::free_form::{Inputs, Shape};
-use crate::selection::untested::NotTested;
+use crate::data::rig::Rig;
+use crate::data::schema::{FitTable, Parameter, Place, Simulation, Verdict};
+use crate::evidence::confidence::Evidence;
+use crate::evidence::known_travel::BeyondFitted;
+use crate::evidence::out_of_library::Foreign;
+use crate::evidence::rejection::{Rather, Rejection};
+use crate::evidence::residual_maps::Map;
+use crate::fit::blocked_recording::BlockedRecording;
+use crate::laws::EffectName;
+use crate::propose::free_form::{Inputs, Shape};
+use crate::propose::untested::NotTested;
 use crate::simulation::comparison::Comparison;
-use crate::validation::confidence::Evidence;
-use crate::validation::known_travel::BeyondFitted;
-use crate::validation::out_of_library::Foreign;
-use crate::validation::rejection::{Rather, Rejection};
-use crate::validation::residual_maps::Map;
 use std::collections::BTreeMap;
 
 /// The result of the stages.

@@ -3,9 +3,9 @@
 
 use super::assess::Assessment;
 use super::evidence_table::EvidenceRow;
-use crate::effects::EffectName;
-use crate::io::schema::Simulation;
-use crate::validation::weighed_model::WeighedEffect;
+use crate::data::schema::Simulation;
+use crate::evidence::weighed_model::WeighedEffect;
+use crate::laws::EffectName;
 use regression::Hypothesis;
 
 /// The rows of every effect that a proposer looked at, `none` first.

@@ -1,15 +1,15 @@
 //! The patched rig, and the place where an effect acts.
 
-use crate::effects::{Effect, Law};
-use crate::estimation::blocked_recording::BlockedRecording;
-use crate::estimation::model::total;
-use crate::estimation::nominal::{Key, Nominal};
-use crate::estimation::skew;
-use crate::io::rig::Rig;
-use crate::io::schema::{Place, Region, Stretch};
-use crate::selection::context::FittedModel;
-use crate::validation::parameters;
-use crate::validation::residual_maps;
+use crate::data::rig::Rig;
+use crate::data::schema::{Place, Region, Stretch};
+use crate::evidence::parameters;
+use crate::evidence::residual_maps;
+use crate::fit::blocked_recording::BlockedRecording;
+use crate::fit::model::total;
+use crate::fit::nominal::{Key, Nominal};
+use crate::fit::skew;
+use crate::laws::{Effect, Law};
+use crate::propose::context::FittedModel;
 
 /// Part of its nominal value that an inertia which hardly matters keeps at least.
 const LEAST_INERTIA: f64 = 0.1;
@@ -121,7 +121,7 @@ pub(crate) fn place(nominal: &Nominal, fit: &[BlockedRecording], last: &FittedMo
                 let travel = with.dz[j] - without.dz[j];
                 if track.motion.rest[j] {
                     0.0
-                } else if last.model.effects[index].name.subsystem() == crate::effects::Subsystem::Sensor {
+                } else if last.model.effects[index].name.subsystem() == crate::laws::Subsystem::Sensor {
                     travel * travel
                 } else {
                     force * force

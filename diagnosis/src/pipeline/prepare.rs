@@ -2,25 +2,25 @@
 //! before any effect is looked for.
 
 use super::Progress;
-use crate::data_faults::Checked;
-use crate::effects::definition::{Shown, Span};
-use crate::effects::{Effect, EffectName};
-use crate::estimation::blocked_recording::{BlockedRecording, Jumps};
-use crate::estimation::filter::Noise;
-use crate::estimation::fit::Fit;
-use crate::estimation::force_residual::Estimator;
-use crate::estimation::lost_counts::{self, Asked};
-use crate::estimation::model::Model;
-use crate::estimation::noise::{self, Colour};
-use crate::estimation::nominal::Nominal;
-use crate::estimation::{quasi_static, refit, skew};
-use crate::io::recording::Recording;
-use crate::io::rig::{Kind, Rig};
-use crate::selection::candidates::span_of;
-use crate::selection::context::{FitContext, FittedModel};
-use crate::selection::excitation::Excitation;
-use crate::validation::holdout_set::HoldoutSet;
-use crate::validation::residuals::{drive_force, forces};
+use crate::data::recording::Recording;
+use crate::data::rig::{Kind, Rig};
+use crate::evidence::holdout_set::HoldoutSet;
+use crate::evidence::residuals::{drive_force, forces};
+use crate::fit::blocked_recording::{BlockedRecording, Jumps};
+use crate::fit::filter::Noise;
+use crate::fit::fit::Fit;
+use crate::fit::force_residual::Estimator;
+use crate::fit::lost_counts::{self, Asked};
+use crate::fit::model::Model;
+use crate::fit::noise::{self, Colour};
+use crate::fit::nominal::Nominal;
+use crate::fit::{quasi_static, refit, skew};
+use crate::laws::definition::{Shown, Span};
+use crate::laws::{Effect, EffectName};
+use crate::propose::candidates::span_of;
+use crate::propose::context::{FitContext, FittedModel};
+use crate::propose::excitation::Excitation;
+use crate::repair::Checked;
 
 /// Rig and recordings before any effect is looked for.
 pub(crate) struct Prepared {

@@ -1,11 +1,11 @@
 //! The regression's proposals: rig and recordings as it reads them, and no opinion.
 
 use super::prepare::Prepared;
-use crate::data_faults::Checked;
-use crate::effects::EffectName;
-use crate::estimation::skew;
-use crate::io::recording::Recording;
-use crate::io::rig::{Kind, Rig};
+use crate::data::recording::Recording;
+use crate::data::rig::{Kind, Rig};
+use crate::fit::skew;
+use crate::laws::EffectName;
+use crate::repair::Checked;
 use crate::thresholds::FOLLOWS_SHARE;
 use regression::laws::{ActsOn, Law};
 use regression::{Hypothesis, Part, Value};

@@ -1,9 +1,9 @@
 //! The nominal, refitted and patched rig run forward and compared with the held-out recordings:
 //! this is the usual meaning of a simulation that fits.
 
-use crate::io::recording::Recording;
-use crate::io::rig::Rig;
-use crate::io::schema::{ByModel, Simulation, WindowsOff};
+use crate::data::recording::Recording;
+use crate::data::rig::Rig;
+use crate::data::schema::{ByModel, Simulation, WindowsOff};
 use crate::simulation::comparison::{Comparison, Figures};
 use crate::thresholds::WORSE_MOTION;
 

@@ -2,16 +2,16 @@
 //! model.
 
 use super::diagnosis::Reason;
-use crate::effects::CommandLaw;
-use crate::estimation::blocked_recording::BlockedRecording;
-use crate::estimation::nominal::Nominal;
-use crate::io::schema::Verdict;
-use crate::selection::excitation::Excitation;
+use crate::data::schema::Verdict;
+use crate::evidence::comparison::Shown;
+use crate::evidence::residual_maps::Map;
+use crate::evidence::residuals::{above, refit_matters};
+use crate::evidence::weighed_model::WeighedModel;
+use crate::fit::blocked_recording::BlockedRecording;
+use crate::fit::nominal::Nominal;
+use crate::laws::CommandLaw;
+use crate::propose::excitation::Excitation;
 use crate::thresholds::{MATERIAL, UNDERSTOOD};
-use crate::validation::comparison::Shown;
-use crate::validation::residual_maps::Map;
-use crate::validation::residuals::{above, refit_matters};
-use crate::validation::weighed_model::WeighedModel;
 
 /// Part of the force that must be left, on every recording, to say that the rig's model does not
 /// speak of these recordings.

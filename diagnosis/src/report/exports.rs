@@ -1,9 +1,9 @@
 //! A rig for other simulators. What a format cannot express is a note in the file; nothing is left
 //! out in silence.
 
-use crate::effects::Effect;
-use crate::effects::joint_terms::JointTerms;
-use crate::io::rig::{Kind, Rig};
+use crate::data::rig::{Kind, Rig};
+use crate::laws::Effect;
+use crate::laws::joint_terms::JointTerms;
 use std::fmt::Write as _;
 
 /// A format to export to.

@@ -1,6 +1,6 @@
 //! Faults of recordings in words.
 
-use crate::io::schema::{DataFault, FaultKind};
+use crate::data::schema::{DataFault, FaultKind};
 use numerics::digits::in_sentence;
 
 /// A clause for each kind of fault, with the recordings that have it.

@@ -1,6 +1,6 @@
 //! A force of any form in one sentence. Nothing here knows recordings.
 
-use crate::effects::{ForceTable, Variable};
+use crate::laws::{ForceTable, Variable};
 use numerics::digits::short;
 
 /// Part of a form's mean square that counts as all of it, in words.

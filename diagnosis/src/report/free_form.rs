@@ -1,11 +1,11 @@
 //! A force without a name in the report: its entry and its picture.
 
-use crate::effects::Variable;
-use crate::io::rig::Kind;
-use crate::io::schema::FreeForm;
+use crate::data::rig::Kind;
+use crate::data::schema::FreeForm;
+use crate::laws::Variable;
 use crate::pipeline::diagnosis::FreeForce;
+use crate::propose::free_form::Shape;
 use crate::report::form_in_words;
-use crate::selection::free_form::Shape;
 use html_report::drawing::path;
 use html_report::plot::{close, frame};
 use html_report::safe;

@@ -1,9 +1,9 @@
 //! `report.html`: one page without network, for a desktop and a phone. Plain SVG drawn here; the
 //! script of [`html_report::plot`] shows the values under the pointer.
 
-use crate::io::recording::shown_at;
-use crate::io::rig::Kind;
-use crate::io::schema::{Hypothesis, Named, Verdict};
+use crate::data::recording::shown_at;
+use crate::data::rig::Kind;
+use crate::data::schema::{Hypothesis, Named, Verdict};
 use crate::report::decisive_plot;
 use crate::report::faults;
 use crate::report::free_form;

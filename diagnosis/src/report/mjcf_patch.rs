@@ -7,9 +7,9 @@
 
 use super::exports::{joint_of, xml};
 use super::xml::{Tag, changed, tags};
-use crate::effects::joint_terms::{Gap, JointTerms};
-use crate::io::rig::{Kind, Rig};
-use crate::io::schema::Named;
+use crate::data::rig::{Kind, Rig};
+use crate::data::schema::Named;
+use crate::laws::joint_terms::{Gap, JointTerms};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::ops::Range;

@@ -24,7 +24,7 @@ pub(crate) mod text;
 mod write;
 mod xml;
 
-pub use crate::io::schema::{
+pub use crate::data::schema::{
     Both, ByModel, Contending, DataFault, FaultKind, FitTable, FreeForm, Hypothesis, Named, Parameter, Place,
     Region, Report, Simulation, Stretch, Untested, Verdict, WindowsOff,
 };

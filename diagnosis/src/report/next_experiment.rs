@@ -1,7 +1,7 @@
 //! The recording to make next: the experiment that would separate two effects, or show one at all.
 
-use crate::effects::{EffectName as N, experiments};
-use crate::validation::known_travel::BeyondFitted;
+use crate::evidence::known_travel::BeyondFitted;
+use crate::laws::{EffectName as N, experiments};
 use numerics::digits::short_within;
 
 /// The recording that would decide within a class.
@@ -37,4 +37,4 @@ pub(crate) const LOUDER: &str = "the same with larger and faster changes of the 
 pub(crate) const GENERAL: &str = "ten seconds or more at 500 Hz or more with reversals, several speeds both ways and a \
     command that is not constant, for example a slow triangle with a multisine on top";
 
-pub(crate) use crate::effects::experiments::SPEEDS;
+pub(crate) use crate::laws::experiments::SPEEDS;

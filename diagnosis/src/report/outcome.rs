@@ -1,17 +1,17 @@
 //! The result of a diagnosis: the report, the evidence behind it, and the rigs.
 
-use crate::effects::EffectName;
-use crate::io::rig::{Kind, Rig};
-use crate::io::schema::{Both, Contending, FitTable, Hypothesis, Named, Report, Untested, Verdict};
+use crate::data::rig::{Kind, Rig};
+use crate::data::schema::{Both, Contending, FitTable, Hypothesis, Named, Report, Untested, Verdict};
+use crate::evidence::residual_maps::Map;
+use crate::laws::EffectName;
 use crate::pipeline::decisive::Decisive;
 use crate::pipeline::diagnosis::{
     Complete, Contender, Diagnosis, JudgedHypothesis, NamedEffect, Reason, Rigs, Series,
 };
 use crate::pipeline::evidence_table::{self, EvidenceRow};
+use crate::propose::free_form::Shape;
 use crate::report::{free_form, next_experiment, notes, remains, text};
-use crate::selection::free_form::Shape;
 use crate::simulation::comparison::Comparison;
-use crate::validation::residual_maps::Map;
 use numerics::digits::in_sentence;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;

@@ -1,7 +1,7 @@
 //! The second and the third line of a report: how much remains against the sensor's noise, and what
 //! to record next.
 
-use crate::io::schema::{Report, Verdict};
+use crate::data::schema::{Report, Verdict};
 use crate::thresholds::UNDERSTOOD;
 
 /// The residual over the sensor's noise from which there is more to be found, and below which there
@@ -85,8 +85,8 @@ fn record_next(report: &Report) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::io::rig::Rig;
-    use crate::io::schema::Both;
+    use crate::data::rig::Rig;
+    use crate::data::schema::Both;
     use crate::pipeline::diagnosis::Reason;
     use crate::report::outcome::Outcome;
 

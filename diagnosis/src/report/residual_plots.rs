@@ -1,8 +1,8 @@
 //! Plots of the place of the residual: over time and over states.
 
+use crate::evidence::residual_maps::Map;
 use crate::pipeline::diagnosis::Series;
 use crate::report::outcome::Outcome;
-use crate::validation::residual_maps::Map;
 use html_report::drawing::path;
 use html_report::plot::{HIGH, close, frame};
 use html_report::safe;

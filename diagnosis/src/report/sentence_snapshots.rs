@@ -1,9 +1,9 @@
 //! The sentence of every verdict, word for word: people read them, and whoever changes one sees it
 //! here.
 
-use crate::effects::EffectName as N;
-use crate::io::rig::{Kind, Rig};
-use crate::io::schema::{Both, Named, Place, Region, Report, Verdict};
+use crate::data::rig::{Kind, Rig};
+use crate::data::schema::{Both, Named, Place, Region, Report, Verdict};
+use crate::laws::EffectName as N;
 use crate::pipeline::diagnosis::Reason;
 use crate::report::outcome::{Outcome, sentence};
 use std::collections::BTreeMap;

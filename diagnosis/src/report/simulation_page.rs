@@ -97,8 +97,8 @@ pub(crate) fn what_next(out: &mut String, items: &[String]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::io::recording::Recording;
-    use crate::io::rig::Rig;
+    use crate::data::recording::Recording;
+    use crate::data::rig::Rig;
     use crate::simulation::comparison::AFRESH_S;
     use crate::simulation::{Plant, Surroundings};
 

@@ -1,8 +1,8 @@
 //! The report in ten lines, for the terminal.
 
-use crate::effects::EffectName;
-use crate::io::recording::shown_at;
-use crate::io::schema::ByModel;
+use crate::data::recording::shown_at;
+use crate::data::schema::ByModel;
+use crate::laws::EffectName;
 use crate::report::faults;
 use crate::report::outcome::Outcome;
 use numerics::digits::short;

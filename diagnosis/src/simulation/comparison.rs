@@ -4,8 +4,8 @@
 use super::frequency::FrequencyResponse;
 use super::replay::{Beside, Deviation, Trajectory};
 use super::{Motion, PositionLoop};
-use crate::io::recording::Recording;
-use crate::io::rig::{Kind, Rig};
+use crate::data::recording::Recording;
+use crate::data::rig::{Kind, Rig};
 use numerics::parallel;
 use serde::Serialize;
 

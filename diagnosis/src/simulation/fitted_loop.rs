@@ -2,7 +2,7 @@
 //! to simulate under that reference rather than under the recorded command.
 
 use super::Motion;
-use crate::io::recording::Recording;
+use crate::data::recording::Recording;
 use numerics::linear::{Factor, Square};
 
 /// Part of the command's variance that a loop has to explain to be believed.

@@ -1,7 +1,7 @@
 //! Frequency responses of a recording and of simulations of it: speed over command.
 
 use super::Motion;
-use crate::io::recording::Recording;
+use crate::data::recording::Recording;
 use numerics::even_grid::{cells, cubic};
 use numerics::spectrum::{Band, response};
 use std::f64::consts::PI;
@@ -75,8 +75,8 @@ impl FrequencyResponse {
 
 #[cfg(test)]
 mod tests {
-    use crate::io::recording::Recording;
-    use crate::io::rig::Rig;
+    use crate::data::recording::Recording;
+    use crate::data::rig::Rig;
     use crate::simulation::comparison::Comparison;
     use crate::simulation::{Plant, Surroundings};
     use std::f64::consts::TAU;

@@ -1,7 +1,7 @@
 //! A recording as motion in SI units: where the axis was and how fast it went.
 
-use crate::io::recording::Recording;
-use crate::io::rig::Rig;
+use crate::data::recording::Recording;
+use crate::data::rig::Rig;
 
 /// Length over which a speed is taken from positions, s, and the fewest rows.
 const SPAN_S: f64 = 0.02;

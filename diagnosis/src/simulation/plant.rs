@@ -1,7 +1,7 @@
 //! A patched rig run forward: nominal model, friction that sticks, and every effect of the rig.
 
-use crate::effects::{CommandLaw, Law, State};
-use crate::io::rig::Rig;
+use crate::data::rig::Rig;
+use crate::laws::{CommandLaw, Law, State};
 
 /// The inputs of the plant from outside during a step.
 #[derive(Debug, Clone, Copy, Default)]

@@ -3,8 +3,8 @@
 //! as the contract has it.
 
 use super::{Motion, Plant, PositionLoop, Surroundings};
-use crate::io::recording::Recording;
-use crate::io::rig::Rig;
+use crate::data::recording::Recording;
+use crate::data::rig::Rig;
 
 /// Longest step of the plant, s.
 const STEP_S: f64 = 1e-4;
@@ -252,7 +252,7 @@ impl<'a> Beside<'a> {
 
 /// The travel after which a rig's periodic effects come again; none where it has none.
 fn period(rig: &Rig) -> Option<f64> {
-    let longest = |effect: &crate::effects::Effect| {
+    let longest = |effect: &crate::laws::Effect| {
         let slowest =
             effect.waves().iter().map(|wave| wave.1.abs()).filter(|w| *w > 0.0).fold(f64::INFINITY, f64::min);
         std::f64::consts::TAU / slowest

@@ -4,8 +4,8 @@
 //! add up.
 
 use super::replay::Beside;
-use crate::io::recording::Recording;
-use crate::io::rig::Rig;
+use crate::data::recording::Recording;
+use crate::data::rig::Rig;
 use numerics::linear::{Factor, Square, dot};
 use numerics::parallel;
 

@@ -1,7 +1,7 @@
 //! A small simulated axis, rotary or linear, for faults that recordings of real machines showed.
 #![allow(dead_code, unreachable_pub, missing_docs)]
 
-use diagnosis::effects::EffectName as N;
+use diagnosis::laws::EffectName as N;
 use diagnosis::recording::Recording;
 use diagnosis::rig::Rig;
 use diagnosis::{Outcome, diagnose_recordings};

@@ -4,7 +4,7 @@
 
 use crate::axis::{AXIS, BENCH, Machine, Taken, WHOLE, diagnosed, mixed, names, record, rig};
 use diagnosis::Verdict;
-use diagnosis::effects::EffectName as N;
+use diagnosis::laws::EffectName as N;
 use diagnosis::recording::Recording;
 use diagnosis::rig::Rig;
 use diagnosis::simulation::{Plant, Surroundings};

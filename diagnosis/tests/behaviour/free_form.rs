@@ -2,7 +2,7 @@
 //! has a name keeps it.
 
 use crate::common::{Setup, record, rig};
-use diagnosis::effects::{EffectName, Variable};
+use diagnosis::laws::{EffectName, Variable};
 use diagnosis::rig::Rig;
 use diagnosis::simulation::{Plant, Surroundings};
 use diagnosis::{Outcome, Verdict, diagnose_recordings};

@@ -3,7 +3,7 @@
 
 use crate::axis::{diagnosed, names, rig};
 use diagnosis::Outcome;
-use diagnosis::effects::EffectName as N;
+use diagnosis::laws::EffectName as N;
 use diagnosis::recording::Recording;
 use std::f64::consts::{PI, TAU};
 

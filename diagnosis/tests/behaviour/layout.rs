@@ -1,22 +1,13 @@
 //! The folders of the crate have an order, and each uses only those before it.
 
-use diagnosis::effects::EffectName;
+use diagnosis::laws::EffectName;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Folders from the bottom to the top. Folders are counted, not files as in the small crates of
 /// host-sim: an arrow within a folder stays within its subject.
-const FLOORS: [&str; 9] = [
-    "effects",
-    "io",
-    "simulation",
-    "data_faults",
-    "estimation",
-    "selection",
-    "validation",
-    "pipeline",
-    "report",
-];
+const FLOORS: [&str; 9] =
+    ["laws", "data", "simulation", "repair", "fit", "propose", "evidence", "pipeline", "report"];
 
 fn sources(dir: &Path, out: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(dir).expect("the folder is there") {
@@ -90,7 +81,7 @@ fn only_thresholds_is_next_to_the_folders() {
     assert!(thresholds.lines().all(|line| named(line).is_empty()), "the numbers that decide use a folder");
 }
 
-/// The code outside `effects/` that may name effects, and why. Facts about an effect belong into
+/// The code outside `laws/` that may name effects, and why. Facts about an effect belong into
 /// its file: ask its `Definition`.
 const MAY_NAME: [(&str, &str); 0] = [];
 
@@ -162,18 +153,18 @@ fn the_definition_of_an_effect_is_in_its_file() {
             if !names_effect(line, &aliases, &variants) {
                 continue;
             }
-            if name.starts_with("effects") {
+            if name.starts_with("laws") {
                 in_effects += 1;
             } else {
                 naming.push((name.clone(), line.trim().to_owned()));
             }
         }
     }
-    assert!(in_effects > 10, "only {in_effects} names were seen in effects/: the reader of sources is blind");
+    assert!(in_effects > 10, "only {in_effects} names were seen in laws/: the reader of sources is blind");
     let may = |file: &str| MAY_NAME.iter().any(|(may, _)| *may == file);
     let wrong: Vec<String> =
         naming.iter().filter(|(file, _)| !may(file)).map(|(file, line)| format!("{file}: {line}")).collect();
-    assert!(wrong.is_empty(), "code outside effects/ names effects:\n{}", wrong.join("\n"));
+    assert!(wrong.is_empty(), "code outside laws/ names effects:\n{}", wrong.join("\n"));
     for (file, why) in MAY_NAME {
         assert!(naming.iter().any(|(name, _)| name == file), "{file} names no effect, and need not ({why})");
     }
@@ -182,12 +173,12 @@ fn the_definition_of_an_effect_is_in_its_file() {
 /// Words of other things that are spelled like a key of a shape, by file, and why. A value of an
 /// effect is asked of the effect: `Effect::turn`, or a method of its `Definition`.
 const OTHER_WORDS: [(&str, &[&str], &str); 9] = [
-    ("src/io/known_keys.rs", &["viscous", "weight", "limit", "turn"], "keys of a rig beside its effects"),
+    ("src/data/known_keys.rs", &["viscous", "weight", "limit", "turn"], "keys of a rig beside its effects"),
     ("src/report/exports.rs", &["damping", "limit"], "keys of an exported joint"),
     ("src/report/residual_plots.rs", &["speed"], "a variable of the motion"),
     ("src/report/decisive_plot.rs", &["speed"], "a variable of the motion"),
     ("src/report/outcome.rs", &["speed", "viscous", "weight"], "a variable, and keys of a rig's model"),
-    ("src/validation/residual_maps.rs", &["speed"], "a variable of the motion"),
+    ("src/evidence/residual_maps.rs", &["speed"], "a variable of the motion"),
     ("experiment/src/case.rs", &["speed"], "a limit of the input"),
     ("experiment/src/write.rs", &["damping"], "a value of the servo"),
     ("device-setup/src/compensate/coefficients.rs", &["viscous", "weight"], "coefficients"),
@@ -242,7 +233,7 @@ fn a_key_of_a_shape_is_spelled_in_effects_alone() {
         .filter(|file| !tests.contains(file))
         .map(|file| (file.strip_prefix(top).unwrap_or(file).display().to_string(), text(file)))
         .collect();
-    let is_of_effects = |name: &str| name.starts_with("src/effects");
+    let is_of_effects = |name: &str| name.starts_with("src/laws");
     let mut keys: Vec<String> =
         texts.iter().filter(|(name, _)| is_of_effects(name)).flat_map(|(_, text)| shape_keys(text)).collect();
     keys.sort();
@@ -264,7 +255,7 @@ fn a_key_of_a_shape_is_spelled_in_effects_alone() {
         .filter(|(file, key, _)| !is_other(file, key))
         .map(|(file, key, line)| format!("{file}: {key}: {line}"))
         .collect();
-    assert!(wrong.is_empty(), "code outside effects/ spells keys of shapes:\n{}", wrong.join("\n"));
+    assert!(wrong.is_empty(), "code outside laws/ spells keys of shapes:\n{}", wrong.join("\n"));
     for (file, words, why) in OTHER_WORDS {
         for word in words {
             let is_there = found.iter().any(|(name, key, _)| name.ends_with(file) && key == word);

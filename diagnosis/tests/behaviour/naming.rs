@@ -4,7 +4,7 @@
 
 use crate::axis::{self, AXIS, BENCH, Machine, Taken, WHOLE, diagnosed, mixed, names, rig};
 use crate::common::{self, Setup, WARM_SQUARE};
-use diagnosis::effects::EffectName as N;
+use diagnosis::laws::EffectName as N;
 use diagnosis::{Outcome, Verdict, diagnose_recordings};
 use std::f64::consts::TAU;
 

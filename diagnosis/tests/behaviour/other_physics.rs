@@ -3,7 +3,7 @@
 
 use crate::axis::{AXIS, BENCH, Machine, Taken, diagnosed, mixed, names, record, rig};
 use diagnosis::Outcome;
-use diagnosis::effects::EffectName as N;
+use diagnosis::laws::EffectName as N;
 
 /// An axis that something pushes at times of its own, with a rig that holds what `model` says.
 fn pushed(machine: Machine, model: &str) -> Outcome {

@@ -2,7 +2,7 @@
 //! of the repository. A test fails where its recordings are absent; `cargo xtask test` leaves it
 //! out there and names it as not run.
 
-use diagnosis::effects::EffectName;
+use diagnosis::laws::EffectName;
 use diagnosis::recording::Recording;
 use diagnosis::rig::Rig;
 use diagnosis::{Outcome, Request, Verdict, diagnose};

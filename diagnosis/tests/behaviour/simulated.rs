@@ -2,7 +2,7 @@
 //! input that does not suffice for a verdict.
 
 use crate::common::{self, Setup, record, rig};
-use diagnosis::effects::EffectName;
+use diagnosis::laws::EffectName;
 use diagnosis::recording::Recording;
 use diagnosis::rig::Rig;
 use diagnosis::{Outcome, Verdict, diagnose_recordings};
@@ -170,7 +170,7 @@ fn a_spring_whose_force_fades_is_no_spring_of_the_library() {
         let why = outcome.report.hypotheses.iter().find(spring).and_then(|h| h.rejected_because.clone());
         assert!(why.is_some_and(|why| why.contains("fade")), "{}", outcome.summary());
         // What is not named is in the patched rig as a table at most.
-        let is_table = |effect: &diagnosis::effects::Effect| effect.table.is_some();
+        let is_table = |effect: &diagnosis::laws::Effect| effect.table.is_some();
         assert!(outcome.patched_rig.effects.iter().all(is_table), "{:?}", outcome.patched_rig.effects);
     }
 }

@@ -3,7 +3,7 @@
 
 use crate::axis::{AXIS, BENCH, Machine, WHOLE, diagnosed, mixed, names, record, rig};
 use diagnosis::Outcome;
-use diagnosis::effects::EffectName as N;
+use diagnosis::laws::EffectName as N;
 use diagnosis::recording::Recording;
 
 fn late_by(machine: Machine, rows: f64) -> Outcome {

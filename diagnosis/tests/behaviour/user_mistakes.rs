@@ -1,7 +1,7 @@
 //! Mistakes that people make with units, signs, columns and files: each gets the sentence that
 //! helps, and none a name.
 
-use diagnosis::effects::EffectName;
+use diagnosis::laws::EffectName;
 use diagnosis::recording::Recording;
 use diagnosis::rig::Rig;
 use diagnosis::simulation::{Plant, Surroundings};

@@ -5,7 +5,7 @@
 use control_core::event::State;
 use control_core::excitation::{Excitation, Servo, Signal};
 use control_core::units::{Damping, Millimetres, MillimetresPerSecond, MillinewtonMetres, Stiffness};
-use diagnosis::effects::{Effect, EffectName};
+use diagnosis::laws::{Effect, EffectName};
 use diagnosis::report::Verdict;
 use fixed::types::{I8F24, I16F16};
 use lab::characterise::mechanism::BareDevice;

@@ -116,8 +116,7 @@ mod tests {
 
     #[test]
     fn the_judge_calls_the_diagnosis_and_no_more() {
-        let text =
-            "let request = diagnosis::Request { rig };\n// diagnosis::effects\nuse diagnosis::effects::Law;";
-        assert_eq!(uses_beyond_the_call(text).collect::<Vec<_>>(), ["use diagnosis::effects::Law;"]);
+        let text = "let request = diagnosis::Request { rig };\n// diagnosis::laws\nuse diagnosis::laws::Law;";
+        assert_eq!(uses_beyond_the_call(text).collect::<Vec<_>>(), ["use diagnosis::laws::Law;"]);
     }
 }

@@ -1,9 +1,9 @@
 use super::*;
-use crate::data_faults::Checked;
-use crate::effects::EffectName as N;
-use crate::io::recording::Recording;
-use crate::io::rig::Rig;
+use crate::data::recording::Recording;
+use crate::data::rig::Rig;
+use crate::laws::EffectName as N;
 use crate::pipeline::prepare::prepare;
+use crate::repair::Checked;
 use crate::simulation::{Plant, Surroundings};
 use std::f64::consts::TAU;
 

@@ -7,7 +7,7 @@ use control_core::units::{Damping, MillimetresPerSecond, MillinewtonMetres};
 use control_core::{Device, TICK_HZ};
 use device_sim::device::compensated::gain;
 use device_sim::error::Error;
-use diagnosis::effects::{Effect, EffectName};
+use diagnosis::laws::{Effect, EffectName};
 use diagnosis::rig::{Kind, Rig};
 use fixed::types::{I8F24, I16F16};
 use std::f64::consts::TAU;

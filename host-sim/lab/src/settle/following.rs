@@ -154,7 +154,7 @@ fn next(
 mod tests {
     use super::*;
     use crate::settle::{Name, Round};
-    use diagnosis::effects::EffectName;
+    use diagnosis::laws::EffectName;
 
     fn round(class: &[&str]) -> Round {
         let class: Vec<String> = class.iter().map(|name| (*name).to_owned()).collect();

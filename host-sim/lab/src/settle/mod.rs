@@ -23,7 +23,7 @@ use crate::characterise::programme::{Programme, programmes};
 use crate::characterise::writer;
 use crate::compensate::{self, Wish};
 use device_sim::error::Error;
-use diagnosis::effects::EffectName;
+use diagnosis::laws::EffectName;
 use diagnosis::report::Report;
 use diagnosis::rig::Rig;
 use diagnosis::{Outcome, Request};

@@ -1,6 +1,6 @@
 //! A named effect with its class.
 
-use diagnosis::effects::EffectName;
+use diagnosis::laws::EffectName;
 
 /// A named effect.
 #[derive(Clone, Debug, PartialEq)]

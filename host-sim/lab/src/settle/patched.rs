@@ -3,7 +3,7 @@
 
 use super::Name;
 use diagnosis::Outcome;
-use diagnosis::effects::EffectName;
+use diagnosis::laws::EffectName;
 use diagnosis::rig::Rig;
 
 /// The rig of the last diagnosis with the settled effects and no others. A name that a round kept
@@ -28,7 +28,7 @@ fn with_settled(rigs: &[&Rig], nominal: &Rig, names: &[Name]) -> Rig {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use diagnosis::effects::Effect;
+    use diagnosis::laws::Effect;
 
     fn rig(effects: &[EffectName]) -> Rig {
         let text = "format = 1\nkind = \"rotary\"\n[model]\ninertia = 1.4e-6\n[actuator]\ngain = 1.4e-5\n\

@@ -1,0 +1,73 @@
+//! Removes the effects that do not generalise when all are judged together.
+
+use crate::evidence::acceptance_criteria::EffectEvidence;
+use crate::evidence::effect_evidence::gather_evidence;
+use crate::evidence::holdout_set::HoldoutSet;
+use crate::evidence::material::Material;
+use crate::evidence::parameters;
+use crate::evidence::rejection::Rejection;
+use crate::fit::filter::Noise;
+use crate::fit::noise::Colour;
+use crate::laws::EffectName;
+use crate::propose::context::{FitContext, FittedModel};
+
+/// A hypothesis that was fitted in full and rejected.
+#[derive(Clone)]
+pub(crate) struct RejectedHypothesis {
+    pub(crate) name: EffectName,
+    /// Gain on held-out recordings, nats; none where it was not judged there.
+    pub(crate) holdout_gain: Option<f64>,
+    pub(crate) why: Rejection,
+}
+
+/// A model all of whose effects carry to the held-out recordings.
+pub(crate) struct StandingModel {
+    /// Under coloured noise.
+    pub(crate) model: FittedModel,
+    /// The evidence for each effect.
+    pub(crate) effects: Vec<EffectEvidence>,
+    /// The effects that were removed.
+    pub(crate) rejected: Vec<RejectedHypothesis>,
+    /// The effects that shares of the force error name.
+    pub(crate) materials: Vec<Material>,
+}
+
+/// Takes out whatever does not carry to the held-out recordings, the weakest first, until all that
+/// is left does, and judges that; `noise` is white, `null_noise` is the null's coloured one,
+/// `materials` are the effects that shares name.
+pub(crate) fn eliminate(
+    mut model: FittedModel,
+    context: &FitContext,
+    holdout: &HoldoutSet,
+    null_noise: &Noise,
+    noise: &Noise,
+    materials: &[Material],
+) -> StandingModel {
+    let mut rejected = Vec::new();
+    loop {
+        let plain = context.fit(model.model.clone(), noise, Colour::White);
+        let mut effects = gather_evidence(context, &plain, &model.noise, holdout);
+        for one in &mut effects {
+            one.material = Material::find(materials, one.effect.name).cloned();
+        }
+        let weakest = effects
+            .iter()
+            .enumerate()
+            .filter_map(|(i, f)| {
+                // Where other physics limits, nothing explains everything: no likelihood rejects
+                // what shares name.
+                let judged = f.material.is_none().then_some(f)?;
+                let why = judged.rejection().or_else(|| parameters::absence(context, &plain, i))?;
+                Some((i, f.holdout.z, why))
+            })
+            .min_by(|a, b| a.1.total_cmp(&b.1));
+        let Some((i, _, why)) = weakest else {
+            return StandingModel { model, effects, rejected, materials: materials.to_vec() };
+        };
+        let (name, gain) = (effects[i].effect.name, effects[i].holdout.sum);
+        rejected.push(RejectedHypothesis { name, holdout_gain: Some(gain), why });
+        let mut less = model.model.clone();
+        less.effects.remove(i);
+        model = context.fit_slow(less, &[null_noise, noise]);
+    }
+}

@@ -1,0 +1,200 @@
+//! A model with the confidence of each of its effects, and what speaks against one of them.
+
+use crate::data::schema::Parameter;
+use crate::evidence::acceptance_criteria::EffectEvidence;
+use crate::evidence::comparison::Shown;
+use crate::evidence::confidence::{self, Evidence};
+use crate::evidence::contradictions::{are_alike, same_joint};
+use crate::evidence::elimination::RejectedHypothesis;
+use crate::evidence::material::Material;
+use crate::evidence::rejection::{Rather, Rejection};
+use crate::evidence::tonal::TonalDisturbance;
+use crate::fit::force_residual::Estimator;
+use crate::laws::EffectName;
+use crate::laws::definition::Definition;
+use crate::propose::context::FittedModel;
+use crate::thresholds::NAMED;
+use std::collections::BTreeMap;
+
+/// One effect with what speaks for and against it.
+pub(crate) struct WeighedEffect {
+    pub(crate) found: EffectEvidence,
+    pub(crate) class: Vec<EffectName>,
+    pub(crate) evidence: Evidence,
+    pub(crate) confidence: f64,
+    pub(crate) parameters: BTreeMap<String, Parameter>,
+    pub(crate) is_there: bool,
+    /// True if more effects than a class may hold explain it as well.
+    pub(crate) undecided: bool,
+    /// Part of the travel over which it bends, where that is more than bristles bend.
+    pub(crate) creeps: Option<f64>,
+    /// The better explanation, where something without a name explains significantly more.
+    pub(crate) rather: Option<Rather>,
+}
+
+impl WeighedEffect {
+    pub(crate) fn explains_more(&self, than: &Self) -> bool {
+        self.found.holdout.sum > than.found.holdout.sum
+    }
+}
+
+/// The model found, its effects weighed, and its residuals.
+pub(crate) struct WeighedModel {
+    pub(crate) effects: Vec<WeighedEffect>,
+    /// The effects that were removed because they were unsure.
+    pub(crate) dropped: Vec<WeighedEffect>,
+    /// The model under coloured noise.
+    pub(crate) slow: FittedModel,
+    /// The hypotheses that were rejected on the way.
+    pub(crate) rejected: Vec<RejectedHypothesis>,
+    /// The effects that shares of the force error name.
+    pub(crate) materials: Vec<Material>,
+    pub(crate) shown: Shown,
+    pub(crate) estimator: Estimator,
+    /// Residual that reading whole counts alone causes, N·m or N.
+    pub(crate) floor: f64,
+    /// True if the model leaves little enough of the force to have understood it.
+    pub(crate) understood: bool,
+    /// Frequency at which a force may swing whatever the axis does, and that force if it does.
+    pub(crate) hertz: Option<f64>,
+    pub(crate) swing: Option<TonalDisturbance>,
+    /// Correlation of the residual between repeats of a motion, where there are any and it is
+    /// surely more than chance.
+    pub(crate) repeats: Option<f64>,
+}
+
+impl WeighedModel {
+    /// Confidence of the surest effect.
+    pub(crate) fn surest(&self) -> f64 {
+        self.effects.iter().map(|e| e.confidence).fold(0.0, f64::max)
+    }
+
+    /// True if confidence, not a veto, decided.
+    pub(crate) fn rests_on_evidence(&self, assessed: &WeighedEffect) -> bool {
+        self.contradiction(assessed).is_none()
+    }
+
+    fn same_joint(&self, assessed: &WeighedEffect) -> Option<EffectName> {
+        let gained = |assessed: &WeighedEffect| (assessed.found.effect.name, assessed.found.holdout.sum);
+        same_joint(gained(assessed), self.effects.iter().map(gained))
+    }
+
+    /// True if it is one of two drifts that a change of the inertia explains.
+    fn drifts_alike(&self, assessed: &WeighedEffect) -> bool {
+        let definition = |assessed: &WeighedEffect| assessed.found.effect.name.definition();
+        let change = |is_of: fn(&dyn Definition) -> bool| {
+            let is_drift = |e: &&WeighedEffect| definition(e).drifts() && is_of(definition(e));
+            Some(self.effects.iter().find(is_drift)?.parameters.get("change")?.value)
+        };
+        let (gain, friction) = (change(|of| of.scales_drive()), change(|of| of.needs_dry()));
+        definition(assessed).drifts()
+            && gain.zip(friction).is_some_and(|(gain, friction)| are_alike(gain, friction))
+    }
+
+    pub(crate) fn stands_for_swing(&self) -> bool {
+        self.swing.is_some_and(|swing| swing.is_mistaken())
+    }
+
+    /// The effect that explains most, with what it would rather be, where something without a name
+    /// explains more.
+    pub(crate) fn resembled(&self) -> Option<(EffectName, Rather)> {
+        let most = self.effects.iter().max_by(|a, b| a.found.holdout.sum.total_cmp(&b.found.holdout.sum))?;
+        Some((most.found.effect.name, most.rather.clone()?))
+    }
+
+    /// Marks the effects at some places as having no size.
+    pub(crate) fn have_no_size(&mut self, places: &[usize]) {
+        for i in places {
+            self.effects[*i].is_there = false;
+        }
+    }
+
+    /// Marks the least sure of the named effects as immaterial: with all of them a model takes only
+    /// this part off the held-out force error.
+    pub(crate) fn weakest_is_immaterial(&mut self, part: f64) {
+        let sure = |i: &usize| self.effects[*i].confidence;
+        let weakest = self.named().into_iter().min_by(|a, b| sure(a).total_cmp(&sure(b)));
+        if let Some(i) = weakest {
+            self.effects[i].found.off_force = part;
+        }
+    }
+
+    /// Takes this model's names and not another's: a name of both is as sure as the surer, and what
+    /// only the other has is rejected.
+    pub(crate) fn is_beside(&mut self, other: &Self) {
+        let named: Vec<&WeighedEffect> = other.named().into_iter().map(|i| &other.effects[i]).collect();
+        for one in &mut self.effects {
+            let same = named.iter().filter(|other| other.class.contains(&one.found.effect.name));
+            one.confidence = same.fold(one.confidence, |most, other| most.max(other.confidence));
+        }
+        let rejected = other.effects.iter().chain(&other.dropped).map(|one| RejectedHypothesis {
+            name: one.found.effect.name,
+            holdout_gain: Some(one.found.holdout.sum),
+            why: other.doubt(one).unwrap_or(Rejection::LeavesMore),
+        });
+        self.rejected.splice(..0, rejected);
+    }
+
+    /// Places of the effects that are named.
+    pub(crate) fn named(&self) -> Vec<usize> {
+        let is_named = |(i, effect): (usize, &WeighedEffect)| self.doubt(effect).is_none().then_some(i);
+        self.effects.iter().enumerate().filter_map(is_named).collect()
+    }
+
+    /// Returns why an effect is not named; none if it is.
+    pub(crate) fn doubt(&self, assessed: &WeighedEffect) -> Option<Rejection> {
+        self.contradiction(assessed).or_else(|| {
+            if assessed.undecided {
+                Some(Rejection::Undecided)
+            } else if assessed.confidence < NAMED {
+                let weakness = confidence::weakness(&assessed.evidence);
+                Some(Rejection::Improbable { probability: assessed.confidence, weakness })
+            } else {
+                None
+            }
+        })
+    }
+
+    /// A larger effect with which it shares a class: either could be the other, so that both
+    /// together are no finding.
+    fn twin_beside(&self, assessed: &WeighedEffect) -> Option<EffectName> {
+        let name = |effect: &WeighedEffect| effect.found.effect.name;
+        let is_twin = |other: &&WeighedEffect| {
+            name(other) != name(assessed)
+                && assessed.class.contains(&name(other))
+                && other.class.contains(&name(assessed))
+                && other.explains_more(assessed)
+        };
+        self.effects.iter().find(is_twin).map(name)
+    }
+
+    /// Returns what rules an effect out however much it explains; none if nothing does.
+    fn contradiction(&self, assessed: &WeighedEffect) -> Option<Rejection> {
+        if let Some(from) = self.twin_beside(assessed) {
+            return Some(Rejection::Indistinguishable { from });
+        }
+        if assessed.found.material.is_some() {
+            // Its shares of the force error, fitted and held out, were judged before it was fitted.
+            return (!assessed.is_there).then_some(Rejection::NoSize);
+        }
+        if let Some(swing) = self.swing.filter(TonalDisturbance::is_mistaken) {
+            Some(Rejection::Swing { hertz: swing.hertz })
+        } else if !assessed.is_there {
+            Some(Rejection::NoSize)
+        } else if let Some(why) = assessed.found.immaterial() {
+            Some(why)
+        } else if let Some(part) = assessed.creeps {
+            Some(Rejection::Creeps { part })
+        } else if let Some(rather) = &assessed.rather {
+            Some(Rejection::Rather(rather.clone()))
+        } else if self.effects.iter().any(|other| other.rather.is_some() && other.explains_more(assessed)) {
+            Some(Rejection::BesideUnknown)
+        } else if let Some(other) = self.same_joint(assessed) {
+            Some(Rejection::SameJoint { other })
+        } else if self.drifts_alike(assessed) {
+            Some(Rejection::InertiaChanges)
+        } else {
+            None
+        }
+    }
+}

@@ -1,0 +1,101 @@
+//! A formula as one of the effects: its law, its search, its part of a report.
+
+use super::Formula;
+use crate::laws::definition::{
+    Allowed, EffectLaw, EffectReport, EffectSearch, FREE, Fitted, ForceLaw, Movable, POSITIVE, Reported, Span,
+};
+use crate::laws::{Effect, EffectName, State, Subsystem};
+
+/// A formula along a recording or in a plant, with the values of its shape.
+#[derive(Debug, Clone)]
+struct FormulaLaw {
+    formula: &'static Formula,
+    shape: Vec<f64>,
+}
+
+impl ForceLaw for FormulaLaw {
+    fn names(&self) -> Vec<String> {
+        self.formula.terms()
+    }
+    fn terms(&mut self, state: &State, velocity: f64, out: &mut [f64]) {
+        self.formula.values(state, velocity, &self.shape, out);
+    }
+    fn copy(&self) -> Box<dyn ForceLaw> {
+        Box::new(self.clone())
+    }
+}
+
+/// Points along a value of a formula's shape, for so many of them together.
+const POINTS: [usize; 3] = [9, 5, 3];
+
+impl EffectLaw for Formula {
+    fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
+        let formula = effect.name.formula()?;
+        // Without a value: the middle of what it may be.
+        let value =
+            |(key, low, high): &Movable| effect.shape.get(*key).copied().unwrap_or(0.5 * (low + high));
+        Some(Box::new(FormulaLaw { formula, shape: formula.shape.iter().map(value).collect() }))
+    }
+    fn is_dry(&self) -> bool {
+        self.is_dry
+    }
+}
+
+impl EffectSearch for Formula {
+    fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
+        if self.uses("tilt") && !span.tilt {
+            return Vec::new();
+        }
+        let points = POINTS[self.shape.len().clamp(1, POINTS.len()) - 1];
+        let mut out = vec![Effect::shaped(name, &[])];
+        for (k, (key, low, high)) in self.shape.iter().enumerate() {
+            let count = if k < POINTS.len() { points } else { 1 };
+            // Bounds of one sign lie decades apart as often as not.
+            let value = |i: usize| {
+                let part = (i as f64 + 0.5) / count as f64;
+                if *low > 0.0 { low * (high / low).powf(part) } else { low + (high - low) * part }
+            };
+            let with = |effect: &Effect, i: usize| {
+                let mut effect = effect.clone();
+                effect.shape.insert((*key).to_owned(), value(i));
+                effect
+            };
+            out = out
+                .iter()
+                .flat_map(|effect| (0..count).map(|i| with(effect, i)).collect::<Vec<_>>())
+                .collect();
+        }
+        out
+    }
+    fn movable(&self, _effect: &Effect, _span: &Span) -> Vec<Movable> {
+        // Refinement moves logarithms.
+        self.shape.iter().filter(|(_, low, _)| *low > 0.0).copied().collect()
+    }
+    fn limits(&self, term: usize, _allowed: &Allowed) -> (f64, f64) {
+        // Per inertia, which is not known exactly: the sign is what bounds say for sure.
+        match self.linear.get(term).and_then(|name| self.text.parameters.get(name)) {
+            Some([low, _]) if *low >= 0.0 => POSITIVE,
+            Some([_, high]) if *high <= 0.0 => (f64::NEG_INFINITY, 0.0),
+            Some(_) => FREE,
+            None => POSITIVE,
+        }
+    }
+    fn freedom(&self, _effect: &Effect, _recordings: usize) -> usize {
+        self.terms().len()
+    }
+}
+
+impl EffectReport for Formula {
+    fn subsystem(&self) -> Subsystem {
+        Subsystem::Load
+    }
+    fn words(&self) -> &'static str {
+        self.words
+    }
+    fn report(&self, fitted: &Fitted) -> Vec<Reported> {
+        let terms = self.terms().into_iter().enumerate();
+        let of_terms = terms.map(|(k, name)| Reported::new(name, fitted.scaled(fitted.term(k)), "1"));
+        let of_shape = self.shape.iter().map(|(name, _, _)| Reported::new(*name, fitted.shape(name), "1"));
+        of_terms.chain(of_shape).collect()
+    }
+}
