@@ -8,11 +8,11 @@
 //!
 //! A diagnosis reads as its folders: `data` (rigs, recordings, the report's shape) is repaired
 //! (`repair`: faults of the logs), effects are proposed (`propose`: candidates and their shapes),
-//! judged (`evidence`: held-out recordings), and one is decided on (`pipeline`, which alone puts the
-//! stages one after another) and reported (`report`: sentences, pages and files). Below them are
-//! `laws` (the effects), `simulation` (a rig run forward) and `fit` (blocks, filter, noise). Each
-//! uses only those before it in the order of `tests/behaviour/layout.rs`, which checks this, and
-//! that no files use each other in a circle. The numbers that admit or reject a name are in
+//! judged (`evidence`: held-out recordings), and one is decided on (`pipeline`, which alone puts
+//! the stages one after another) and reported (`report`: sentences, pages and files). Below them
+//! are `laws` (the effects), `simulation` (a rig run forward) and `fit` (blocks, filter, noise).
+//! Each uses only those before it in the order of `tests/behaviour/layout.rs`, which checks this,
+//! and that no files use each other in a circle. The numbers that admit or reject a name are in
 //! `thresholds`, which every folder may read.
 
 // Matrices are read by row and column.

@@ -13,9 +13,9 @@ pub(crate) enum CommandLaw {
     /// Commands beyond the limit are held at it. With `softness` s > 0 they approach it:
     /// `u/(1 + |u/limit|^(1/s))^s`.
     Clip { limit: f64, softness: f64 },
-    /// What the supply's voltage leaves beside the back-EMF: a clip at `limit` where the axis stands,
-    /// that falls with speed to nothing at `no_load_speed`, rad/s or m/s, and grows as much where
-    /// the drive brakes.
+    /// Commands beyond a line are held at it: the supply's voltage less back-EMF, `limit` where the
+    /// axis stands, nothing at `no_load_speed`, rad/s or m/s, and as much more where the drive
+    /// brakes.
     Supply { limit: f64, no_load_speed: f64 },
     /// A transport delay, s; the queue holds (length, command) of what is under way.
     Delay { delay: f64, queue: VecDeque<(f64, f64)>, waiting: f64 },

@@ -1,5 +1,5 @@
-//! A clip that falls with speed: the supply's voltage against back-EMF. The drive's force is that of
-//! `command` held between `-limit·(1 + q̇/no_load_speed)` and `limit·(1 - q̇/no_load_speed)`.
+//! A clip that falls with speed: the supply's voltage against back-EMF. The drive's force is that
+//! of `command` held between `-limit·(1 + q̇/no_load_speed)` and `limit·(1 - q̇/no_load_speed)`.
 
 use super::definition::{EffectLaw, EffectReport, EffectSearch, Fitted, Movable, Reported, Shown, Span};
 use super::shape::{ShapeKey, shape};

@@ -26,8 +26,9 @@ pub(crate) fn propose(prepared: &Prepared, checked: &Checked) -> Vec<Vec<Hypothe
 }
 
 /// The laws of the command that have no size in any round of the regression and take next to
-/// nothing of the force error there; none where it found nothing at all. A term with the recorded command in it makes both sides smaller, so likelihood
-/// alone finds such laws wherever other physics limits; the regression's columns hold none of it.
+/// nothing of the force error there; none where it found nothing at all. A term with the recorded
+/// command in it makes both sides smaller, so likelihood alone finds such laws wherever other
+/// physics limits; the regression's columns hold none of it.
 pub(crate) fn unsought(rounds: &[Vec<Hypothesis>]) -> Vec<EffectName> {
     let takes = |one: &Hypothesis| one.valid || one.evidence.share >= FOLLOWS_SHARE;
     let is_held = |law: &Law| rounds.iter().flatten().any(|one| one.law == law && takes(one));
