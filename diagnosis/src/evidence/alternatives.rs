@@ -8,7 +8,7 @@ use crate::evidence::holdout_set::HoldoutSet;
 use crate::evidence::known_travel::known;
 use crate::evidence::parameters;
 use crate::fit::blocked_recording::BlockedRecording;
-use crate::fit::fit::Fit;
+use crate::fit::linear_fit::Fit;
 use crate::fit::model::Model;
 use crate::fit::noise::Colour;
 use crate::fit::nominal::Nominal;

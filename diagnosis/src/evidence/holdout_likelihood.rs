@@ -5,8 +5,8 @@
 
 use crate::fit::blocked_recording::BlockedRecording;
 use crate::fit::filter::Noise;
-use crate::fit::fit::{Fit, Prepared};
 use crate::fit::input::Total;
+use crate::fit::linear_fit::{Fit, Prepared};
 use crate::fit::model::{Model, total};
 use crate::fit::nominal::{Key, Nominal};
 use crate::propose::context::FittedModel;

@@ -6,7 +6,7 @@
 use crate::evidence::effect_evidence::gather_evidence;
 use crate::evidence::holdout_set::HoldoutSet;
 use crate::evidence::rejection::Rather;
-use crate::fit::fit::Fit;
+use crate::fit::linear_fit::Fit;
 use crate::fit::model::Model;
 use crate::fit::noise::Colour;
 use crate::laws::definition::Unnamed;

@@ -76,7 +76,8 @@ pub(crate) fn shape_sd(context: &FitContext, candidate: &FittedModel, effect: us
         let mut model = candidate.model.clone();
         let value = model.effects[effect].shape[key];
         model.effects[effect].shape.insert(key.to_owned(), value * factor);
-        crate::fit::fit::Fit::new(&model, context.nominal, context.tracks, &candidate.noise).log_likelihood
+        crate::fit::linear_fit::Fit::new(&model, context.nominal, context.tracks, &candidate.noise)
+            .log_likelihood
     };
     let here = candidate.fit.log_likelihood;
     let mut step = 0.02_f64;

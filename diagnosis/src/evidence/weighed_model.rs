@@ -130,7 +130,7 @@ impl WeighedModel {
         let rejected = other.effects.iter().chain(&other.dropped).map(|one| RejectedHypothesis {
             name: one.found.effect.name,
             holdout_gain: Some(one.found.holdout.sum),
-            why: other.doubt(one).unwrap_or(Rejection::LeavesMore),
+            why: other.doubt(one).unwrap_or(Rejection::LessByShares),
         });
         self.rejected.splice(..0, rejected);
     }

@@ -2,9 +2,9 @@
 //! estimator leaves, over the blocks that move.
 
 use crate::fit::blocked_recording::BlockedRecording;
-use crate::fit::fit::{Fit, Prepared};
 use crate::fit::force_residual::Estimator;
 use crate::fit::input::Total;
+use crate::fit::linear_fit::{Fit, Prepared};
 use crate::fit::model::total;
 use crate::fit::whitened::grams;
 use numerics::parallel;

@@ -3,7 +3,7 @@
 
 use crate::fit::blocked_recording::BlockedRecording;
 use crate::fit::filter::Gains;
-use crate::fit::fit::Fit;
+use crate::fit::linear_fit::Fit;
 use numerics::linear::dot;
 use numerics::linear::{Factor, Square};
 

@@ -3,8 +3,8 @@
 
 use crate::fit::blocked_recording::BlockedRecording;
 use crate::fit::filter::{Noise, Observed};
-use crate::fit::fit::Fit;
 use crate::fit::input::Total;
+use crate::fit::linear_fit::Fit;
 use crate::fit::model::Model;
 use crate::fit::noise::{self, Colour};
 use crate::fit::nominal::{Key, Nominal};

@@ -7,8 +7,8 @@
 
 use crate::fit::blocked_recording::BlockedRecording;
 use crate::fit::filter::Noise;
-use crate::fit::fit::Fit;
 use crate::fit::force_residual::Estimator;
+use crate::fit::linear_fit::Fit;
 use crate::fit::model::Model;
 use crate::fit::nominal::{Kept, Nominal};
 use crate::thresholds::MATERIAL;

@@ -9,8 +9,8 @@
 use crate::fit::blocked_recording::BlockedRecording;
 use crate::fit::effective_command::delayed;
 use crate::fit::filter::Noise;
-use crate::fit::fit::Fit;
 use crate::fit::force_residual::Estimator;
+use crate::fit::linear_fit::Fit;
 use crate::fit::model::Model;
 use crate::fit::nominal::{Key, Nominal};
 use crate::fit::skew_columns::MOST_ROWS;

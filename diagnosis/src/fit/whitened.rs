@@ -75,7 +75,7 @@ mod tests {
     use crate::data::rig::Rig;
     use crate::fit::blocked_recording::BlockedRecording;
     use crate::fit::filter::Noise;
-    use crate::fit::fit::Fit;
+    use crate::fit::linear_fit::Fit;
     use crate::fit::model::Model;
     use crate::fit::nominal::Nominal;
     use crate::laws::{Effect, EffectName};

@@ -3,7 +3,7 @@
 //! no effects.
 
 use crate::fit::filter::Noise;
-use crate::fit::fit::Fit;
+use crate::fit::linear_fit::Fit;
 use crate::fit::model::Model;
 use crate::fit::noise::Colour;
 use crate::laws::{Effect, WholeMachine};

@@ -5,7 +5,7 @@
 //! offset and phases among them, is fitted anew without the blocks that it is judged on. A model
 //! with more freedom pays for it here by itself.
 
-use crate::fit::fit::{Fit, normal_of};
+use crate::fit::linear_fit::{Fit, normal_of};
 use numerics::linear::{Prior, bounded};
 
 /// Parts that segments are dealt into.

@@ -3,8 +3,8 @@
 
 use crate::fit::blocked_recording::BlockedRecording;
 use crate::fit::effective_command::{effective_command, effective_commands};
-use crate::fit::fit::Fit;
 use crate::fit::input::Input;
+use crate::fit::linear_fit::Fit;
 use crate::fit::model::Model;
 use crate::fit::nominal::Nominal;
 use crate::fit::regressors::effect_inputs;

@@ -1,7 +1,7 @@
 //! Naming: forward selection of effects, backward pruning, and the swap of each effect against its
 //! rivals.
 
-use crate::fit::fit::Fit;
+use crate::fit::linear_fit::Fit;
 use crate::fit::model::Model;
 use crate::fit::noise::Colour;
 use crate::laws::definition::NominalTerm;

@@ -2,8 +2,8 @@
 //! coefficients projected out.
 
 use crate::fit::filter::Noise;
-use crate::fit::fit::Fit;
 use crate::fit::input::Input;
+use crate::fit::linear_fit::Fit;
 use crate::fit::model::{Model, total};
 use crate::propose::candidates;
 use crate::propose::context::FitContext;
