@@ -58,9 +58,8 @@ pub(crate) enum Rejection {
     /// The force that the motion asks for, of which the recorded command holds no part, shows
     /// nothing of a law of the command.
     NotInMotion,
-    /// Other physics limits, and what is named instead takes a part of the force error that is
-    /// sure.
-    LessByShares,
+    /// The model that it is in leaves more of the force error than the one that is named.
+    LeavesMore,
     /// Another effect explains more instead.
     Behind { winner: EffectName, z: f64 },
 }

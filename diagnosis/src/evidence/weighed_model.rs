@@ -130,7 +130,7 @@ impl WeighedModel {
         let rejected = other.effects.iter().chain(&other.dropped).map(|one| RejectedHypothesis {
             name: one.found.effect.name,
             holdout_gain: Some(one.found.holdout.sum),
-            why: other.doubt(one).unwrap_or(Rejection::LessByShares),
+            why: other.doubt(one).unwrap_or(Rejection::LeavesMore),
         });
         self.rejected.splice(..0, rejected);
     }
@@ -175,7 +175,8 @@ impl WeighedModel {
         }
         if assessed.found.material.is_some() {
             // Its shares of the force error, fitted and held out, were judged before it was fitted.
-            return (!assessed.is_there).then_some(Rejection::NoSize);
+            let no_size = (!assessed.is_there).then_some(Rejection::NoSize);
+            return no_size.or_else(|| assessed.found.immaterial());
         }
         if let Some(swing) = self.swing.filter(TonalDisturbance::is_mistaken) {
             Some(Rejection::Swing { hertz: swing.hertz })

@@ -43,6 +43,13 @@ pub(crate) struct Assessment {
     pub(crate) foreign: Option<Foreign>,
 }
 
+impl Assessment {
+    /// Force errors with what is named.
+    pub(super) fn table(&self) -> &FitTable {
+        &self.named_alone.as_ref().unwrap_or(&self.weighed.shown).table
+    }
+}
+
 /// Weighs the effects that were found; the reason where the rig's model does not describe the
 /// recordings at all.
 pub(crate) fn assess(prepared: &Prepared, found: Found) -> Result<Assessment, Reason> {

@@ -4,7 +4,12 @@ use super::prepare::Prepared;
 use super::search::{Found, in_its_own_motion};
 use crate::evidence::effect_evidence::gather_evidence;
 use crate::evidence::elimination::StandingModel;
+use crate::evidence::holdout_set::HoldoutSet;
+use crate::evidence::known_travel::known;
 use crate::evidence::material::{self, Material};
+use crate::evidence::residuals::residuals;
+use crate::fit::blocked_recording::BlockedRecording;
+use crate::fit::force_residual::Estimator;
 use crate::fit::model::Model;
 use crate::fit::noise::Colour;
 use crate::laws::definition::NominalTerm;
@@ -71,9 +76,22 @@ fn standing(prepared: &Prepared, found: &Found, first: FittedModel, materials: V
     let model = own.fit_in_band(white);
     let null = own.fit_at(Model::default(), &model.noise);
     let mut evidence = gather_evidence(&own, &model, &model.noise, &holdout);
-    for one in &mut evidence {
+    for (i, one) in evidence.iter_mut().enumerate() {
+        one.off_force = off_force(&own, &model, i, &holdout);
         one.material = Material::find(&materials, one.effect.name).cloned();
     }
     let rejected = found.standing.rejected.clone();
     Found { fit, holdout, null, standing: StandingModel { model, effects: evidence, rejected, materials } }
+}
+
+/// The part that an effect takes off the held-out force error, beside a model without it that is
+/// fitted to the force in the band as well.
+fn off_force(context: &FitContext, model: &FittedModel, effect: usize, holdout: &HoldoutSet) -> f64 {
+    let mut less = model.model.clone();
+    less.effects.remove(effect);
+    let less = context.fit_in_band(context.fit(less, &model.noise, Colour::White));
+    let estimator = Estimator::new(context.tracks, &model.noise, context.scale);
+    let known: &[BlockedRecording] = &known(&holdout.smoothed, &model.model, context.span);
+    let left = residuals(context.nominal, &estimator, known, true, &less, model);
+    1.0 - estimator.rms(&left.patched, known) / estimator.rms(&left.refit, known).max(1e-300)
 }

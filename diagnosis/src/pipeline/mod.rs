@@ -26,10 +26,11 @@ use crate::data::error::InputError;
 use crate::data::recording::Recording;
 use crate::data::rig::Rig;
 use crate::data::sufficiency;
+use crate::evidence::residuals::above;
 use crate::fit::{plausibility, skew};
 use crate::propose::context::FittedModel;
 use crate::repair::Checked;
-use crate::thresholds::SUREST_BESIDE_PHYSICS;
+use crate::thresholds::CLEARLY_LESS;
 use assess::Assessment;
 use by_regression::by_regression;
 use check::Check;
@@ -115,7 +116,7 @@ fn assessed(prepared: &Prepared, found: Found, rounds: &[Vec<Hypothesis>]) -> Re
     let by_filter = assess::assess(prepared, found);
     let by_regression = by_regression.filter(|one| !one.weighed.named().is_empty() && lowers_error(one));
     match (by_regression, by_filter) {
-        (Some(_), Ok(other)) if is_sure(&other) => Ok(other),
+        (Some(one), Ok(other)) if !is_taken(&one, &other) => Ok(other),
         (Some(mut one), Ok(other)) => {
             one.weighed.is_beside(&other.weighed);
             Ok(one)
@@ -125,16 +126,26 @@ fn assessed(prepared: &Prepared, found: Found, rounds: &[Vec<Hypothesis>]) -> Re
     }
 }
 
-/// True if the filter is surer of a name than it may be where other physics and not noise limits:
-/// there its likelihoods say less than the regression's shares.
-fn is_sure(by_filter: &Assessment) -> bool {
-    let weighed = &by_filter.weighed;
-    weighed.named().into_iter().any(|i| weighed.effects[i].confidence > SUREST_BESIDE_PHYSICS)
+/// True if the model of the regression's names is taken and not what the filter found: it is unless
+/// the other leaves clearly less of the force error of the fitted recordings, above the noise of
+/// reading whole counts. Held-out recordings choose nothing.
+fn is_taken(by_regression: &Assessment, by_filter: &Assessment) -> bool {
+    let left = |one: &Assessment| {
+        let table = one.table();
+        let above_noise = |rms: f64| above(rms, one.weighed.floor, 0.0);
+        above_noise(table.patched.fit) / above_noise(table.refit.fit).max(1e-300)
+    };
+    match &by_filter.foreign {
+        // Physics without a name that is sure is kept where it leaves as little.
+        Some(foreign) => 1.0 - foreign.share >= left(by_regression),
+        None if by_filter.weighed.named().is_empty() => true,
+        None => left(by_filter) >= CLEARLY_LESS.powi(2) * left(by_regression),
+    }
 }
 
 /// True if the named effects together take a material part off the held-out force error.
 fn lowers_error(one: &Assessment) -> bool {
-    assess::is_material(&one.named_alone.as_ref().unwrap_or(&one.weighed.shown).table)
+    assess::is_material(one.table())
 }
 
 /// Why a recording cannot be used, as where a unit or a sign is wrong, with those that still could;

@@ -59,7 +59,7 @@ pub(crate) fn rejection(why: &Rejection) -> String {
         }
         Rejection::LessInSearch => "not fitted in full: other effects explained more in the search".into(),
         Rejection::NotInMotion => "the force that the motion asks for shows nothing of it".into(),
-        Rejection::LessByShares => "other physics limits here, and by its part of the force error something else is named".into(),
+        Rejection::LeavesMore => "what is named instead leaves less of the force error".into(),
         Rejection::Behind { winner, z } => {
             format!("{} explains more by {z:.1} standard errors", winner.in_words())
         }

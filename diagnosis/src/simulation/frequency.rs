@@ -113,8 +113,9 @@ mod tests {
                 let [re, im] = band.response;
                 let size = gain / (w * inertia).hypot(viscous);
                 let phase = -(w * inertia / viscous).atan();
-                assert!((re.hypot(im) / size - 1.0).abs() < 0.05, "{band:?}: {size}");
-                assert!((im.atan2(re) - phase).abs() < 0.08, "{band:?}: {phase}");
+                // Of few averages at a coherence of 0.95 to 0.99.
+                assert!((re.hypot(im) / size - 1.0).abs() < 0.1, "{band:?}: {size}");
+                assert!((im.atan2(re) - phase).abs() < 0.1, "{band:?}: {phase}");
             }
         }
     }

@@ -172,11 +172,12 @@ fn the_definition_of_an_effect_is_in_its_file() {
 
 /// Words of other things that are spelled like a key of a shape, by file, and why. A value of an
 /// effect is asked of the effect: `Effect::turn`, or a method of its `Definition`.
-const OTHER_WORDS: [(&str, &[&str], &str); 9] = [
+const OTHER_WORDS: [(&str, &[&str], &str); 10] = [
     ("src/data/known_keys.rs", &["viscous", "weight", "limit", "turn"], "keys of a rig beside its effects"),
     ("src/report/exports.rs", &["damping", "limit"], "keys of an exported joint"),
     ("src/report/residual_plots.rs", &["speed"], "a variable of the motion"),
     ("src/report/decisive_plot.rs", &["speed"], "a variable of the motion"),
+    ("src/report/mjcf_patch.rs", &["damping", "delay", "gap"], "attributes of MuJoCo and values of a joint"),
     ("src/report/outcome.rs", &["speed", "viscous", "weight"], "a variable, and keys of a rig's model"),
     ("src/evidence/residual_maps.rs", &["speed"], "a variable of the motion"),
     ("experiment/src/case.rs", &["speed"], "a limit of the input"),
