@@ -156,16 +156,16 @@ pub(crate) const SUREST_BESIDE_PHYSICS: f64 = 0.8;
 pub(crate) const NAMED_SHARE: f64 = 0.15;
 pub(crate) const TAKEN_Z: f64 = 1.0;
 pub(crate) const SIZES_AGREE: f64 = 0.4;
-/// Part of the force error from which a mismatch is called no random one, and from which the filter
-/// looks for a law of the command: a tenth of its square.
+/// Part of the force error from which a mismatch is called no random one, and from which the
+/// filter looks for a law of the command: a tenth of its square.
 pub(crate) const FOLLOWS_SHARE: f64 = 0.05;
 /// Part of its share that a rival must take, and standard errors by which it must be behind at
 /// most, to join its class. The same rule.
 pub(crate) const NEAR_SHARE: f64 = 0.85;
 pub(crate) const NEAR_LEAD_Z: f64 = 2.0;
 /// Factor on the force error below which the filter's model leaves clearly less than that of what
-/// the regression names, and is taken. On 79 development cases (seed 80001) anything from 0.5 to 0.9 finds the same
-/// but for one case; 1 finds one fewer and names two more falsely.
+/// the regression names, and is taken. On 79 development cases (seed 80001) anything from 0.5 to
+/// 0.9 finds the same but for one case; 1 finds one fewer and names two more falsely.
 pub(crate) const CLEARLY_LESS: f64 = 0.9;
 /// Log-odds of a name by shares, without a share and per share. They were set on the shares of a
 /// regression that is gone (seed 52302) and were not set again: of this one's names on seed 86001
