@@ -102,7 +102,7 @@ pub(crate) fn report(name: &str, content: &str, options: &[&str]) -> Value {
     serde_json::from_str(&json).expect("it is JSON")
 }
 
-/// That a report names the friction of the axis with its values, within a tenth.
+/// That a report names the friction of the axis with its values, within 11 %.
 pub(crate) fn has_values(name: &str, report: &Value) {
     let effects = report["effects"].as_array().expect("effects");
     for (effect, parameter, truth) in
