@@ -3,7 +3,6 @@
 
 import { LearningCurve } from "./learning_curve.js";
 import { number, said, t } from "./language.js";
-import { SessionSheet } from "./session_sheet.js";
 import { Tasks } from "./tasks.js";
 
 const byId = (id) => document.getElementById(id);
@@ -28,15 +27,13 @@ export class Practice {
     this.touchedAt = NaN;
     this.tasks = new Tasks(link);
     this.curve = new LearningCurve(byId("curve"), colours);
-    this.sheet = new SessionSheet(() => ({ attempts: this.own(), goal: byId("goal").textContent, words: byId("curve").dataset.words ?? "", curve: byId("curve") }));
     this.record = byId("record");
     this.name = byId("record-name");
     this.record.addEventListener("click", () => this.askForRecording());
     byId("view-events").addEventListener("click", () => this.show(false));
     byId("view-practice").addEventListener("click", () => this.show(true));
-    /** The goal's steps, and the next of them; none where all are done. */
-    this.steps = [];
-    this.next = null;
+    /** The next step in words; empty where all are done. */
+    this.next = "";
     this.head();
   }
 
@@ -47,7 +44,6 @@ export class Practice {
 
   /** Goes to the practice or back to the events. */
   show(open) {
-    this.isShown = true;
     document.body.dataset.list = open ? "practice" : "events";
     byId("practice").hidden = !open;
     byId("events").hidden = open;
@@ -60,23 +56,10 @@ export class Practice {
     byId("list-views").hidden = false;
     byId("events-title").hidden = true;
     const isNew = this.patient !== patient || this.purpose !== purpose;
-    Object.assign(this, { patient, purpose, steps, goalWords: goal, next: next === null ? null : steps[next] });
+    Object.assign(this, { patient, purpose, next: next === null ? "" : said(steps[next].words) });
     write(byId("goal"), `${said(goal)}.`);
     this.tasks.follow(steps, next);
-    // A stranger finds what is to be done, step by step.
-    if (isNew && purpose === "cannulation" && !this.isShown) this.show(true);
     if (isNew) this.list();
-    if (isNew) this.drawCurve();
-  }
-
-  /** One for each goal: what was learnt in another procedure says little about this one. */
-  drawCurve() {
-    this.curve.draw(this.own());
-  }
-
-  /** A person's attempts at the present goal. */
-  own() {
-    return this.attempts.filter((one) => one.by_person && one.figures.verdict.goal === this.goalWords);
   }
 
   /** An insertion has ended. After a reconnection all are reported again. */
@@ -85,7 +68,7 @@ export class Practice {
     this.attempts.push(attempt);
     if (attempt.by_person) this.say(attempt);
     this.list();
-    this.drawCurve();
+    this.curve.draw(this.attempts.filter((one) => one.by_person));
   }
 
   say({ number: which, figures }) {
@@ -119,8 +102,7 @@ export class Practice {
       const { passed } = attempt.figures.verdict;
       cell(t(passed ? "practice.reached" : "practice.missed"), passed ? "good" : "bad");
       for (const [, key, digits] of COLUMNS) {
-        // A demonstration is no attempt to be better or worse.
-        const isComparable = attempt.by_person && best && best !== attempt && best.patient === attempt.patient && key !== "in_lumen_s";
+        const isComparable = best && best !== attempt && best.patient === attempt.patient && key !== "in_lumen_s";
         cell(...compared(attempt.figures[key], isComparable ? best.figures[key] : null, digits));
       }
       return row;

@@ -3,7 +3,6 @@
 
 mod acceptance;
 mod axes;
-mod bone;
 mod cannulation;
 mod characterise;
 #[cfg(all(unix, feature = "class"))]
@@ -30,7 +29,6 @@ mod papers_page;
 mod patients;
 mod plant;
 mod recordings;
-mod relaxation;
 mod safety_page;
 #[cfg(unix)]
 mod serial;
