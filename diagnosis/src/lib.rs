@@ -101,11 +101,8 @@ pub fn check_recordings(
     fit: &[Recording],
     holdout: &[Recording],
 ) -> Result<Vec<String>, InputError> {
-    sentences(rig, &repair::check(rig, fit, holdout))
-}
-
-fn sentences(rig: &Rig, checked: &repair::Checked) -> Result<Vec<String>, InputError> {
-    Ok(report::check::sentences(&pipeline::check(rig, checked, &|_, _| {})?))
+    let checked = repair::check(rig, fit, holdout);
+    Ok(report::check::sentences(&pipeline::check(rig, &checked, &|_, _| {})?))
 }
 
 /// Diagnoses recordings that are already read; an error where one cannot be used, as where a unit
@@ -117,9 +114,10 @@ pub fn diagnose_recordings(
     progress: &(dyn Fn(&str, f64) + Sync),
 ) -> Result<Outcome, InputError> {
     let checked = repair::check(rig, fit, holdout);
-    let mut outcome = Outcome::of(pipeline::run(rig, &checked, progress)?);
+    let (diagnosis, check) = pipeline::run(rig, &checked, progress)?;
+    let mut outcome = Outcome::of(diagnosis);
     // Where nothing can be learnt, the verdict says it already.
-    outcome.evidence.check = sentences(rig, &checked).unwrap_or_default();
+    outcome.evidence.check = check.as_ref().map(report::check::sentences).unwrap_or_default();
     outcome.report.data_faults = checked.faults;
     progress("done", 1.0);
     Ok(outcome)

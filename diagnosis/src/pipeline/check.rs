@@ -1,8 +1,7 @@
 //! A check of recordings in seconds: everything that is said before an effect is looked for.
 //! Nothing here names or rejects.
 
-use super::Progress;
-use super::prepare;
+use super::prepare::Prepared;
 use crate::data::recording::Recording;
 use crate::data::rig::{Kind, Rig};
 use crate::data::schema::DataFault;
@@ -55,9 +54,8 @@ pub(crate) struct Seen {
     pub(crate) at_limit: f64,
 }
 
-/// Looks at recordings that can be used.
-pub(crate) fn check(rig: &Rig, checked: &Checked, progress: Progress) -> Check {
-    let prepared = prepare::prepare(rig, checked, None, progress);
+/// Looks at recordings that can be used, prepared without a skew that somebody knows.
+pub(crate) fn check(rig: &Rig, checked: &Checked, prepared: &Prepared) -> Check {
     let context = prepared.context(&prepared.fit);
     let fit = Fit::new(&Model::default(), context.nominal, context.tracks, &prepared.noise);
     let estimator = Estimator::new(context.tracks, &prepared.noise, prepared.scale);

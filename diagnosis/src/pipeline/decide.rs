@@ -21,6 +21,7 @@ use crate::evidence::confidence;
 use crate::evidence::free_form_check::{FreeFormShare, Unnamed};
 use crate::evidence::known_travel;
 use crate::evidence::material;
+use crate::evidence::parameters;
 use crate::evidence::rejection::Rejection;
 use crate::evidence::residual_maps::{self, Map};
 use crate::evidence::residuals::{Residuals, above};
@@ -188,7 +189,16 @@ impl Decision<'_> {
                 true => confidence::with_worse_motion(effect.confidence),
                 false => effect.confidence,
             },
-            parameters: beside_rivals::widened(&context, patched, i, &effect.found.rivals),
+            parameters: beside_rivals::widened(
+                &context,
+                patched,
+                i,
+                &effect.found.rivals,
+                match with_named {
+                    Some(_) => parameters::parameters(&context, patched, i),
+                    None => effect.parameters.clone(),
+                },
+            ),
             place: place(nominal, fit, patched, i),
         };
         let named = weighed.named().into_iter().map(|i| &weighed.effects[i]).enumerate();

@@ -62,17 +62,22 @@ fn unusable_or_too_little(rig: &Rig, checked: &Checked) -> Option<Unusable> {
 pub(crate) fn check(rig: &Rig, checked: &Checked, progress: Progress) -> Result<Check, InputError> {
     match unusable_or_too_little(rig, checked) {
         Some(Unusable::Refused(sentence) | Unusable::TooLittle(sentence)) => Err(InputError::new(sentence)),
-        None => Ok(check::check(rig, checked, progress)),
+        None => Ok(check::check(rig, checked, &prepare::prepare(rig, checked, None, progress))),
     }
 }
 
-/// Diagnoses recordings of a rig; an error where one of them cannot be used at all.
-pub(crate) fn run(rig: &Rig, checked: &Checked, progress: Progress) -> Result<Diagnosis, InputError> {
+/// Diagnoses recordings of a rig, and says what they can show where they show something; an error
+/// where one of them cannot be used at all.
+pub(crate) fn run(
+    rig: &Rig,
+    checked: &Checked,
+    progress: Progress,
+) -> Result<(Diagnosis, Option<Check>), InputError> {
     match unusable_or_too_little(rig, checked) {
         Some(Unusable::Refused(sentence)) => return Err(InputError::new(sentence)),
         Some(Unusable::TooLittle(sentence)) => {
             let reason = Reason::Recordings(sentence);
-            return Ok(Diagnosis::CannotTell { rig: Box::new(rig.clone()), reason, rate_hz: None });
+            return Ok((Diagnosis::CannotTell { rig: Box::new(rig.clone()), reason, rate_hz: None }, None));
         }
         None => {}
     }
@@ -87,16 +92,18 @@ pub(crate) fn run(rig: &Rig, checked: &Checked, progress: Progress) -> Result<Di
         (prepared, rounds, found)
     };
     let (mut prepared, mut rounds, mut found) = proposed(None);
+    let check = check::check(rig, checked, &prepared);
     if let Some(rows) = hidden_skew(&prepared, &found) {
         (prepared, rounds, found) = proposed(Some(rows));
     }
     let assessed = assessed(&prepared, found, &rounds);
     progress("writing down", 0.95);
     let rate_hz = all.iter().map(|recording| recording.rate_hz()).min_by(f64::total_cmp);
-    Ok(match assessed {
+    let diagnosis = match assessed {
         Ok(assessment) => decide::decide(&prepared, &assessment, &rounds, holdout, rate_hz),
         Err(reason) => Diagnosis::CannotTell { rig: Box::new(prepared.nominal.rig.clone()), reason, rate_hz },
-    })
+    };
+    Ok((diagnosis, Some(check)))
 }
 
 /// The skew between command and reading, in rows, that only shows once the effects that were found
