@@ -1,7 +1,8 @@
-//! Notes on a refit that a reader has to know: commands that act early or late, an inertia far from
-//! the rig's.
+//! Notes that a reader has to know: commands that act early or late, an inertia far from the rig's,
+//! and what a log alone cannot distinguish from a name.
 
-use crate::pipeline::diagnosis::Moved;
+use crate::laws::EffectName;
+use crate::pipeline::diagnosis::{Moved, NamedEffect};
 
 /// Standard deviations from the rig's value at which a value is reported as far from it.
 const FAR: f64 = 2.0;
@@ -16,8 +17,22 @@ const SCATTERS: f64 = 1.0;
 const HIDDEN: &str =
     "the recordings do not show the inertia, so the rig's is kept: a faster motion would show it";
 
-/// The notes, each a clause.
-pub(crate) fn notes(moved: &Moved) -> Vec<String> {
+/// The notes on a diagnosis, each a clause.
+pub(crate) fn notes(moved: &Moved, named: &[NamedEffect]) -> Vec<String> {
+    let delay = named.iter().find(|effect| effect.name == EffectName::CommandDelay);
+    let delay = delay.and_then(|effect| effect.parameters.get("delay"));
+    of_refit(moved).into_iter().chain(delay.map(|delay| late_reading(delay.value))).collect()
+}
+
+/// The note on a delay, s: only the time between the two columns is in a log.
+fn late_reading(delay: f64) -> String {
+    format!(
+        "readings that are logged {:.3} ms late look the same as this delay: compare the clocks of command and reading before the drive is changed",
+        1e3 * delay
+    )
+}
+
+fn of_refit(moved: &Moved) -> Vec<String> {
     let timing = moved.late_rows.filter(|rows| rows.abs() >= SKEWED).map(timing);
     let is_far = moved.is_at_limit || moved.deviations.abs() >= FAR;
     let inertia = match (moved.is_hidden, is_far) {
@@ -64,17 +79,18 @@ mod tests {
             is_hidden: false,
             scatter: Some(0.3),
         };
-        assert!(notes(&near).is_empty());
-        assert!(notes(&Moved { late_rows: Some(0.002), ..near }).is_empty());
+        assert!(of_refit(&near).is_empty());
+        assert!(of_refit(&Moved { late_rows: Some(0.002), ..near }).is_empty());
         let far = Moved { inertia_by_gain: 0.1, deviations: 3.5, ..near };
-        let both = notes(&Moved { late_rows: Some(-0.5), ..far });
+        let both = of_refit(&Moved { late_rows: Some(-0.5), ..far });
         assert!(both[0].contains("0.50 rows before"), "{both:?}");
         assert!(both[1].contains("0.10 times the rig's, 3.5 of"), "{both:?}");
-        let at_limit = notes(&Moved { inertia_by_gain: 4.64, deviations: 1.47, is_at_limit: true, ..near });
+        let at_limit =
+            of_refit(&Moved { inertia_by_gain: 4.64, deviations: 1.47, is_at_limit: true, ..near });
         assert!(at_limit[0].contains("4.64 times the rig's, as far as"), "{at_limit:?}");
-        let analogue = notes(&Moved { scatter: Some(3.26), ..near });
+        let analogue = of_refit(&Moved { scatter: Some(3.26), ..near });
         assert!(analogue.len() == 1 && analogue[0].contains("about 3.3 counts"), "{analogue:?}");
-        let hidden = notes(&Moved { is_at_limit: true, is_hidden: true, ..near });
+        let hidden = of_refit(&Moved { is_at_limit: true, is_hidden: true, ..near });
         assert!(hidden.len() == 1 && hidden[0].contains("do not show the inertia"), "{hidden:?}");
     }
 }

@@ -248,6 +248,7 @@ impl Outcome {
         let form = diagnosis.free_form.as_ref().and_then(|force| force.shape.as_ref());
         let form = form.map(|shape| free_form::sentence(shape, kind.length()));
         let separating_experiment = separating(&diagnosis, kind);
+        let notes = notes::notes(&diagnosis.moved, &diagnosis.effects);
         let Rigs { nominal, refit, patched } = diagnosis.rigs;
         let untested = diagnosis.untested.into_iter();
         let contending_rigs = diagnosis.contenders.into_iter().map(|one| one.rig).collect();
@@ -262,7 +263,7 @@ impl Outcome {
             refitted: refitted(&patched),
             command_late_rows: diagnosis.moved.late_rows,
             data_faults: Vec::new(),
-            notes: notes::notes(&diagnosis.moved),
+            notes,
             residual_bandwidth_hz: diagnosis.bandwidth_hz,
             noise_floor: diagnosis.noise_floor,
             unexplained_fraction: diagnosis.unexplained_fraction,
