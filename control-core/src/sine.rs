@@ -7,9 +7,8 @@ use fixed::types::I2F30;
 /// Sine of a phase of which 2^32 is a turn; error below 1e-4. Straight lines between 256 points:
 /// twelve sines are to fit a tick.
 pub(crate) fn sine(phase: u32) -> I2F30 {
-    let place = (phase >> 24) as usize;
-    let point = |place: usize| SINE_Q30.get(place).copied().unwrap_or_default();
-    let (from, to) = (point(place), point(place + 1));
+    let &[from, to] =
+        SINE_Q30.get((phase >> 24) as usize..).and_then(<[i32]>::first_chunk).unwrap_or(&[0, 0]);
     // The rest of the phase in Q31, and a way of which the last bit is free.
     let way = upper_half((to - from) << 1, (phase << 8 >> 1).cast_signed());
     I2F30::from_bits(from + way)

@@ -107,6 +107,24 @@ fn another_version_is_turned_away() {
     assert!(!device.endpoint.in_session());
 }
 
+/// The bytes of commit 8dc88938: its program's hello, and its device's answer to that of another
+/// version. Each reads what the other says, so that both say it in a sentence.
+#[test]
+fn a_hello_of_protocol_9_is_turned_away_in_its_words() {
+    const HELLO: [u8; 9] = [0x02, 0x01, 0x06, 0x09, 0x81, 0x0b, 0x5f, 0x87, 0x00];
+    const ANSWER: [u8; 11] = [0x01, 0x09, 0x05, 0x01, 0x01, 0x02, 0x75, 0x3d, 0x2b, 0x07, 0x00];
+    let mut device = Device::new();
+    device.endpoint.receive(&HELLO);
+    let mut out = [0; MAX_FRAME];
+    let length = device.endpoint.transmit(&mut out);
+    assert_eq!(&out[..length], &ANSWER, "an old program with this device");
+    let heard: Vec<DeviceFrame> = ANSWER.into_iter().filter_map(|byte| device.reception.push(byte)).collect();
+    assert!(
+        matches!(heard[..], [DeviceFrame::Ack(ack)] if ack.result == Err(CommandRefusal::Version)),
+        "this program with an old device: {heard:?}"
+    );
+}
+
 #[test]
 fn a_hello_says_how_long_the_heat_is_unknown() {
     let mut limited = config::Device::commissioned_virtual();

@@ -7,6 +7,7 @@
 mod answers;
 mod arrows;
 mod bench;
+mod beside;
 mod board_test;
 mod boards;
 mod counts;

@@ -132,23 +132,24 @@ pub(crate) fn prepare(device: &Device) -> FeedforwardPlan {
     let inverse = |x: I16F16| I16F16::ONE.checked_div(x).unwrap_or_default();
     let mut plan = FeedforwardPlan {
         is_some: found.is_some(),
-        phase_per_count: u32::try_from(((1_u64 << 32) + counts / 2) / counts).unwrap_or(u32::MAX),
         viscous: [per_speed(&found.inwards), per_speed(&found.outwards)],
         per_blend: per_blend(span),
         per_deadband: inverse(found.deadband.0.saturating_mul_int(2)),
         store: store.to_bits() >> 16,
         ..FeedforwardPlan::default()
     };
-    make_ready(&found.angle, &mut plan.angle);
-    make_ready(&found.ripple, &mut plan.ripple);
+    let turn_per_count = u32::try_from(((1_u64 << 32) + counts / 2) / counts).unwrap_or(u32::MAX);
+    make_ready(&found.angle, turn_per_count, &mut plan.angle);
+    make_ready(&found.ripple, turn_per_count, &mut plan.ripple);
     plan
 }
 
-/// Out of line, and not once for each number of waves: it takes less flash.
+/// The first wave of order 0 ends them. Out of line, and not once for each number of waves: it
+/// takes less flash.
 #[inline(never)]
-fn make_ready(waves: &[Wave], ready: &mut [ReadyWave]) {
-    for (ready, &wave) in ready.iter_mut().zip(waves) {
-        *ready = wave.into();
+fn make_ready(waves: &[Wave], turn_per_count: u32, ready: &mut [ReadyWave]) {
+    for (ready, &wave) in ready.iter_mut().zip(waves.iter().take_while(|wave| wave.order != 0)) {
+        *ready = ReadyWave::new(wave, turn_per_count);
     }
 }
 

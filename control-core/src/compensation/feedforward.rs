@@ -27,8 +27,6 @@ const RELEASE_PLACES: u32 = 11;
 pub(crate) struct FeedforwardPlan {
     /// True if there is anything to feed forward.
     pub(super) is_some: bool,
-    /// The phase of a count; 2^32 are a turn.
-    pub(super) phase_per_count: u32,
     /// mN·m·s/mm, inwards and outwards.
     pub(super) viscous: [I2F30; 2],
     /// 1/(full speed − rest speed), s/mm.
@@ -41,20 +39,25 @@ pub(crate) struct FeedforwardPlan {
     pub(super) ripple: [ReadyWave; MAX_RIPPLES],
 }
 
-/// A [`Wave`] in numbers of which nothing is to be shifted.
+/// A [`Wave`] in numbers of which nothing is to be shifted; by default one that adds nothing.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct ReadyWave {
-    /// Periods a turn; 0: there are no more waves.
-    order: u32,
-    /// 2^32 are a period.
+    /// The phase of a count; 2^32 are a period.
+    per_count: u32,
+    /// The phase where the rotor's angle is zero.
     phase: u32,
     /// Q18: an amplitude stays below 2^13.
     amplitude: i32,
 }
 
-impl From<Wave> for ReadyWave {
-    fn from(Wave { order, amplitude, phase }: Wave) -> Self {
-        Self { order: order.into(), phase: u32::from(phase) << 16, amplitude: amplitude.to_bits() << 2 }
+impl ReadyWave {
+    /// Prepares a wave of a rotor, each of whose counts is `turn_per_count` of a turn in 2^-32.
+    pub(super) fn new(Wave { order, amplitude, phase }: Wave, turn_per_count: u32) -> Self {
+        Self {
+            per_count: turn_per_count.wrapping_mul(order.into()),
+            phase: u32::from(phase) << 16,
+            amplitude: amplitude.to_bits() << 2,
+        }
     }
 }
 
@@ -153,11 +156,11 @@ impl Feedforward {
         if turn == RENEW_TURN {
             self.renew(found, tilt);
         } else if let Some(index) = self.index {
-            let phase = (rotor.count.wrapping_sub(index).cast_unsigned()).wrapping_mul(plan.phase_per_count);
+            let count = rotor.count.wrapping_sub(index).cast_unsigned();
             if turn.is_multiple_of(2) {
-                self.waves = -at_gain(sum(&plan.angle, phase), angle);
+                self.waves = -at_gain(sum(&plan.angle, count), angle);
             } else {
-                self.ripple = at_gain(sum(&plan.ripple, phase), drive);
+                self.ripple = at_gain(sum(&plan.ripple, count), drive);
             }
         }
         let way = rotor.count.wrapping_sub(self.count);
@@ -263,10 +266,11 @@ fn at_gain(force: I16F16, gain: I16F16) -> I16F16 {
     I16F16::from_bits(truncating_product(force.to_bits(), gain.to_bits(), 16))
 }
 
-/// The sum of waves at a rotor's angle of which 2^32 are a turn.
-fn sum(waves: &[ReadyWave], angle: u32) -> I16F16 {
-    waves.iter().take_while(|wave| wave.order != 0).fold(I16F16::ZERO, |sum, wave| {
-        let phase = angle.wrapping_mul(wave.order).wrapping_add(wave.phase);
+/// The sum of waves at a count past the rotor's zero. All of them: to ask each whether it is the
+/// last takes the longest tick two instructions a wave.
+fn sum(waves: &[ReadyWave], count: u32) -> I16F16 {
+    waves.iter().fold(I16F16::ZERO, |sum, wave| {
+        let phase = count.wrapping_mul(wave.per_count).wrapping_add(wave.phase);
         sum + I16F16::from_bits(upper_half(wave.amplitude, sine_of(phase).to_bits()))
     })
 }

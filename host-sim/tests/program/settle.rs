@@ -78,9 +78,9 @@ fn late() -> (Subject<'static>, Rig) {
     (subject, rig)
 }
 
-/// 38 s of motion at 10 kHz and two diagnoses take some 15 s: fewer would not show a round that is
-/// designed against the one before.
+/// Fewer would not show a round that is designed against the one before.
 #[test]
+#[ignore = "nightly: 38 s of motion at 10 kHz and two diagnoses, 15 s"]
 fn a_class_is_asked_again_within_the_motion_allowed() {
     let out = folder("settle-designed");
     let (mut subject, rig) = late();

@@ -35,7 +35,7 @@ const OTHER_LAWS: u32 = 1_260;
 /// With all that can be fed forward.
 const COMPENSATED: u32 = 1_260;
 /// The largest patients of the other laws on such a device. 1,260 are wanted.
-const BOTH: u32 = 1_480;
+const BOTH: u32 = 1_470;
 const WORKING: [State; 5] =
     [State::Approach, State::Elastic, State::Puncture, State::Friction, State::Withdrawal];
 /// The time at which the hand begins to move.
