@@ -143,6 +143,7 @@ impl<'a> RunLoop<'a> {
             }
             lockstep::empty(|frame| device.transmit(frame), |bytes| self.receive(now, bytes));
             self.follow_needle(now);
+            device.meet_bone(self.needle.as_ref().and_then(|needle| needle.track().bone_mm()));
             device.take_done().into_iter().for_each(|name| self.outlets.task(name.to_owned()));
             if let Some(taken) = self.patient_answer() {
                 let procedure = self.patients.as_ref().filter(|_| taken).and_then(PatientManager::procedure);

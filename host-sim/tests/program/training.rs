@@ -225,6 +225,7 @@ fn patients_are_listed_with_their_layers() {
         "high-body-mass",
         "firm-skin",
         "dorsal-hand",
+        "child",
         "shoulder",
         "phantom",
         "shoulder-joint",

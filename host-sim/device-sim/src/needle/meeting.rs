@@ -38,4 +38,10 @@ impl Meeting {
             Self::Body(body) => body.tops_mm(origin_mm, angle_rad),
         }
     }
+
+    /// Returns where such a line meets bone, mm along it; level layers have none.
+    pub(super) fn bone_mm(&self, origin_mm: [f64; 2], angle_rad: f64) -> Option<f64> {
+        let Self::Body(body) = self else { return None };
+        body.bone_mm(origin_mm, angle_rad)
+    }
 }

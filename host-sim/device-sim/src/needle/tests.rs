@@ -61,3 +61,17 @@ fn a_target_that_ends_is_not_met_beside_it() {
     needle.move_to(-1.0, 37_f64.to_radians());
     assert_eq!(needle.tops_mm()[bursa], None);
 }
+
+/// The humerus is a ball of 23 mm about the origin: under 1.5 mm of cartilage, where the line comes
+/// to it.
+#[test]
+fn bone_lies_under_the_cartilage_of_a_joint() {
+    let needle = track("shoulder-joint");
+    let humerus = usize::from(number("shoulder-joint", "humerus"));
+    let cartilage_mm = needle.tops_mm()[humerus].expect("it is met");
+    assert!((needle.bone_mm().expect("there is bone") - cartilage_mm - 1.5).abs() < 1e-9);
+    assert_eq!(track("adult").bone_mm(), None);
+    let mut beside = track("shoulder-joint");
+    beside.move_to(-1.0, 5_f64.to_radians());
+    assert_eq!(beside.bone_mm(), None, "a flat needle passes over the joint");
+}

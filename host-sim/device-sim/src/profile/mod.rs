@@ -32,13 +32,17 @@ use person::Thickness;
 pub use person::{Difficulty, Person, Sex, Site};
 pub(crate) use tissues::TissueName;
 
+/// The procedure of a patient whose file names none.
+pub(crate) const USUAL_PROCEDURE: &str = "venepuncture";
+
 /// The profiles that come with the program.
-pub const BUILT_IN: [(&str, &str); 11] = [
+pub const BUILT_IN: [(&str, &str); 12] = [
     ("adult", include_str!("../../../profiles/adult.toml")),
     ("thin-elderly", include_str!("../../../profiles/thin-elderly.toml")),
     ("high-body-mass", include_str!("../../../profiles/high-body-mass.toml")),
     ("firm-skin", include_str!("../../../profiles/firm-skin.toml")),
     ("dorsal-hand", include_str!("../../../profiles/dorsal-hand.toml")),
+    ("child", include_str!("../../../profiles/child.toml")),
     ("shoulder", include_str!("../../../profiles/shoulder.toml")),
     ("phantom", include_str!("../../../profiles/phantom.toml")),
     ("shoulder-joint", include_str!("../../../profiles/shoulder-joint.toml")),
@@ -117,7 +121,7 @@ impl Profile {
             has_vein,
             beside: file.beside,
             body,
-            procedure: file.procedure.unwrap_or_else(|| "venepuncture".into()),
+            procedure: file.procedure.unwrap_or_else(|| USUAL_PROCEDURE.into()),
             person: file.patient,
             name: file.name,
             entry_rad: file.entry_deg.to_radians(),

@@ -83,6 +83,7 @@ impl Simulation {
                 },
             );
             publisher.needle(needle.track().origin_mm());
+            device.meet_bone(needle.track().bone_mm());
             if driver.is_ready(now)
                 && let Some(line) = needle.due(now)
             {
