@@ -267,14 +267,20 @@ impl Memory {
 
     /// Returns the pace at which the wall follows a needle that rests, in its own.
     fn rest(&mut self, stretch: I16F16, has_stopped: bool) -> Option<i32> {
+        if self.rest.is_none() && !has_stopped {
+            return None;
+        }
         let stretch = stretch.saturating_abs();
         let starts = Rest { least: stretch, catching_up: CATCH_UP_TICKS };
-        let rest = self.rest.unwrap_or(starts);
-        let least = rest.least.min(stretch);
-        let goes_on = stretch > least.saturating_add(GOES_ON);
-        let rests = has_stopped || self.rest.is_some() && !goes_on;
-        self.rest = rests.then(|| Rest { least, catching_up: rest.catching_up.saturating_sub(1) });
-        rests.then_some(1 + i32::from(rest.catching_up > 0))
+        let rest = self.rest.get_or_insert(starts);
+        rest.least = rest.least.min(stretch);
+        if !has_stopped && stretch > rest.least.saturating_add(GOES_ON) {
+            self.rest = None;
+            return None;
+        }
+        let left = rest.catching_up;
+        rest.catching_up = left.saturating_sub(1);
+        Some(1 + i32::from(left > 0))
     }
 
     /// LuGre over a step of `step` mm, in Q16.
