@@ -143,6 +143,19 @@ fn a_clamped_needle_relaxes_from_the_moment_it_stops() {
     }
 }
 
+/// In muscle the wall is 2 mm behind the tip; on the way back that stretch goes off with each mm,
+/// and friction rubs the other way.
+#[test]
+fn a_needle_that_turns_round_does_not_rest() {
+    let mut needle = Needle::new(&shoulder(), STRAIGHT);
+    needle.go(15.0, 4.0, |_| ());
+    for mm in [14.5, 14.0, 13.0] {
+        needle.go(mm, 4.0, |_| ());
+        let (got, wanted) = (force(&needle.tick()), mm - 13.0 - 0.304);
+        assert!((got - wanted).abs() < 0.1, "{mm} mm: {got} N, not {wanted} N");
+    }
+}
+
 #[test]
 fn a_trembling_hand_that_rests_reads_as_friction() {
     let mut needle = Needle::new(&shoulder(), STRAIGHT);

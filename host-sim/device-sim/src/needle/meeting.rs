@@ -5,8 +5,9 @@ use crate::profile::{InBody, Profile};
 /// The layers of a patient, as a line meets them.
 #[derive(Clone, Debug)]
 pub(super) enum Meeting {
-    /// Perpendicular to the skin, mm; the target ends to either side, if its patient says so: its
-    /// number, and from where to where along the skin, mm.
+    /// Perpendicular to the skin, mm; of a vessel, the height at which the needle goes through it
+    /// beside its axis. The target ends to either side, if its patient says so: its number, and
+    /// from where to where along the skin, mm.
     Level { depths_mm: Vec<f64>, ends: Option<(usize, (f64, f64))> },
     /// The structures of a body.
     Body(Box<InBody>),
@@ -17,9 +18,9 @@ impl Meeting {
         if let Some(body) = &profile.body {
             return Self::Body(Box::new(body.clone()));
         }
-        let layers = &profile.config.patient.layers;
+        let depths = profile.plan.own_line().depths;
         let ends = profile.goal().and_then(|goal| Some((usize::from(goal.layer), goal.reach_mm?)));
-        Self::Level { depths_mm: layers.iter().map(|layer| layer.depth.0.to_num()).collect(), ends }
+        Self::Level { depths_mm: depths.iter().map(|depth| depth.0.to_num()).collect(), ends }
     }
 
     /// Returns where a line from `origin_mm` meets each layer, mm along it.

@@ -36,8 +36,8 @@ impl LineSender {
     pub fn new(profile: &Profile) -> Self {
         Self {
             track: NeedleTrack::new(profile),
-            sent: own(profile),
-            own: own(profile),
+            sent: profile.plan.own_line(),
+            own: profile.plan.own_line(),
             plan: profile.plan.clone(),
             sent_at: Duration::ZERO,
             has_pierced: false,
@@ -86,10 +86,6 @@ impl LineSender {
         (self.sent, self.sent_at, self.has_pierced) = (line.clone(), now, false);
         Some(line)
     }
-}
-
-fn own(profile: &Profile) -> NeedleLine {
-    NeedleLine { depths: profile.config.patient.layers.iter().map(|layer| layer.depth).collect() }
 }
 
 /// Returns the line of a needle: lengths along it times the sine of its angle. A layer without a
