@@ -201,8 +201,8 @@ impl Driver {
         self.waiting.push_back(Command::Compensate(gains));
     }
 
-    /// Tells the device where `needle`, which has turned in tissue, meets the layers, if that is due
-    /// at `now`. Only the latest line counts.
+    /// Tells the device at `now` where `needle` meets the layers, if it has turned in tissue. Only
+    /// the latest line counts.
     pub fn follow(&mut self, now: Duration, needle: &mut LineSender) {
         if self.is_ready(now)
             && let Some(line) = needle.due(now)
