@@ -262,6 +262,9 @@ impl File {
                 "depth_mm of the {word} is given, and [body] says where it is; remove depth_mm"
             ));
         }
+        if self.layer.iter().any(|layer| layer.over_bone_mm.is_some()) {
+            return Err("over_bone_mm is given, and [body] says where bone is; remove over_bone_mm".into());
+        }
         let by_person = self.layer.iter().find_map(|layer| layer.thickness);
         let fat_mm = by_person.map(|rule| rule.of_mm(&self.patient)).transpose()?;
         let mut body = written.resolve(self.entry_deg, fat_mm)?;
