@@ -29,8 +29,8 @@ pub struct Score {
     /// Print xAPI statements for a learning record store, as a JSON array
     #[arg(long, conflicts_with = "json", requires = "actor")]
     xapi: bool,
-    /// The trainee's e-mail address, for --xapi
-    #[arg(long, value_name = "E-MAIL", requires = "xapi")]
+    /// The trainee's e-mail address or a pseudonym, for --xapi
+    #[arg(long, value_name = "E-MAIL|NAME", requires = "xapi")]
     actor: Option<String>,
 }
 

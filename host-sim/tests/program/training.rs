@@ -81,7 +81,7 @@ fn a_score_is_written_as_xapi_statements() {
     for (statement, one) in statements.iter().zip(&insertions) {
         let mut keys: Vec<&String> = statement.as_object().expect("an object").keys().collect();
         keys.sort();
-        assert_eq!(keys, ["actor", "context", "object", "result", "timestamp", "verb", "version"]);
+        assert_eq!(keys, ["actor", "context", "id", "object", "result", "timestamp", "verb", "version"]);
         assert_eq!(statement["actor"]["mbox"], "mailto:trainee@example.org");
         let result = &statement["result"];
         assert_eq!((&result["success"], &result["completion"]), (&true.into(), &true.into()), "{statement}");
@@ -97,7 +97,10 @@ fn a_score_is_written_as_xapi_statements() {
         assert!(extensions.keys().all(|key| key.starts_with("urn:needle-insertion:")));
         assert_eq!(extensions["urn:needle-insertion:figure:peak_force_n"], one["peak_force_n"]);
     }
-    refused(&run(&["score", text(&file), "--xapi", "--actor", "nobody"]), 2, &["--actor", "nobody"]);
+    refused(&run(&["score", text(&file), "--xapi", "--actor", "nobody@"]), 2, &["--actor", "nobody@"]);
+    assert_ne!(statements[0]["id"], statements[1]["id"]);
+    let again: Value = serde_json::from_str(&run_well(&score)).expect("JSON");
+    assert_eq!(again[0]["id"], statements[0]["id"], "a store takes it once");
     refused(&run(&["score", text(&file), "--xapi"]), 2, &["--actor"]);
 }
 
