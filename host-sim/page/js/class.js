@@ -24,7 +24,7 @@ class Card {
     this.element.dataset.name = name;
     translate(this.element);
     const find = (selector) => this.element.querySelector(selector);
-    write(find("h2"), name);
+    this.heading = find("h2");
     this.chip = find(".chip");
     this.reason = find(".reason");
     this.canvas = find("canvas");
@@ -59,6 +59,7 @@ class Card {
   tell(member) {
     const [state, words, tone] = condition(member);
     this.element.dataset.state = state;
+    write(this.heading, member.trainee ? `${member.name} · ${member.trainee}` : member.name);
     this.chip.dataset.tone = tone;
     write(this.chip.lastElementChild, words);
     write(this.reason, member.gone ? "" : said(member.stuck ?? ""));

@@ -28,7 +28,7 @@ export class Practice {
     this.touchedAt = NaN;
     this.tasks = new Tasks(link);
     this.curve = new LearningCurve(byId("curve"), colours);
-    this.sheet = new SessionSheet(() => ({ attempts: this.own(), goal: byId("goal").textContent, words: byId("curve").dataset.words ?? "", curve: byId("curve") }));
+    this.sheet = new SessionSheet((message) => link.send(message), () => ({ attempts: this.own(), goal: byId("goal").textContent, words: byId("curve").dataset.words ?? "", curve: byId("curve") }));
     this.record = byId("record");
     this.name = byId("record-name");
     this.record.addEventListener("click", () => this.askForRecording());
@@ -149,7 +149,8 @@ export class Practice {
   }
 
   /** Follows the server: the recording in progress, or null, and the file of the last one that was ended. */
-  follow({ recording, recorded }) {
+  follow({ recording, recorded, trainee }) {
+    if (this.patient !== null) this.sheet.follow({ trainee });
     const debrief = byId("debrief");
     if (debrief.hidden !== !recorded) debrief.hidden = !recorded;
     const text = t(recording ? "practice.end" : "practice.record");

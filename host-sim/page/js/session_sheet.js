@@ -1,16 +1,23 @@
 // The trainee's name and the session on one printable page: who, when, what was passed and why not, the figures, the curve and a line
-// to sign. The name is kept in this browser only, until it is emptied; nothing of it goes to the server.
+// to sign. The name is kept in this browser only, until it is emptied; the program tells it to nobody but the class that its device is in.
 
 import { number, said, t } from "./language.js";
 
 const byId = (id) => document.getElementById(id);
 const KEPT = "trainee";
+/** A program that was told a name knows it after so long. */
+const TOLD_MS = 2000;
 /** The figures of an attempt: the key of their heading, the name of the figure, its digits. */
 const FIGURES = [["practice.time", "time_s", 1], ["practice.force", "peak_force_n", 2], ["practice.in_vein", "in_lumen_s", 1]];
 
 export class SessionSheet {
-  /** @param {() => { attempts: object[], goal: string, words: string, curve: HTMLCanvasElement }} session what is to be printed */
-  constructor(session) {
+  /**
+   * @param {(message: object) => void} send takes the name to the program
+   * @param {() => { attempts: object[], goal: string, words: string, curve: HTMLCanvasElement }} session what is to be printed
+   */
+  constructor(send, session) {
+    this.send = send;
+    this.toldAt = -Infinity;
     this.session = session;
     this.name = byId("trainee");
     try {
@@ -22,8 +29,17 @@ export class SessionSheet {
     byId("print-session").addEventListener("click", () => this.print());
   }
 
+  /** Says who is at the device to a program that does not know anybody: it may have been started again. */
+  follow({ trainee }) {
+    const name = this.name.value.trim();
+    if (trainee || !name || performance.now() - this.toldAt < TOLD_MS) return;
+    this.toldAt = performance.now();
+    this.send({ do: "trainee", name });
+  }
+
   keep() {
     const name = this.name.value.trim();
+    this.send({ do: "trainee", name });
     try {
       if (name) localStorage.setItem(KEPT, name);
       else localStorage.removeItem(KEPT);

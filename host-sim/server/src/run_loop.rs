@@ -312,6 +312,7 @@ impl<'a> RunLoop<'a> {
             Control::EndRecording => self.outlets.end_recording(&self.driver),
             Control::Probe(view) => self.outlets.probe(view),
             Control::Task { name } => self.task(name),
+            Control::Trainee { name } => self.outlets.trainee = Some(name).filter(|name| !name.is_empty()),
             Control::Start => self.driver.start(),
             Control::Stop => {
                 self.person_starts = true;

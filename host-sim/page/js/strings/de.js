@@ -258,7 +258,7 @@ export default {
   "practice.pass_mark": "Bestehensgrenze",
   "sheet.title": "Übungssitzung",
   "sheet.trainee": "Übende Person",
-  "sheet.trainee_title": "Ein Name oder Pseudonym; bleibt nur in diesem Browser, bis das Feld geleert wird",
+  "sheet.trainee_title": "Ein Name oder Pseudonym; bleibt nur in diesem Browser, bis das Feld geleert wird; ein Kurs, dem Sie beitreten, sieht ihn",
   "sheet.print": "Sitzung drucken",
   "sheet.print_title": "Eine Seite: Name, Datum, jeder Versuch, warum nicht bestanden, und eine Zeile zum Unterschreiben",
   "sheet.date": "Datum",

@@ -258,7 +258,7 @@ export default {
   "practice.pass_mark": "pass mark",
   "sheet.title": "Practice session",
   "sheet.trainee": "Trainee",
-  "sheet.trainee_title": "A name or a pseudonym; kept in this browser only, until you empty it",
+  "sheet.trainee_title": "A name or a pseudonym; kept in this browser only, until you empty it; a class that you join sees it",
   "sheet.print": "Print session",
   "sheet.print_title": "One page: name, date, each attempt, why it did not pass, and a line to sign",
   "sheet.date": "Date",

@@ -258,7 +258,7 @@ export default {
   "practice.pass_mark": "seuil de réussite",
   "sheet.title": "Séance d’exercice",
   "sheet.trainee": "Apprenant",
-  "sheet.trainee_title": "Un nom ou un pseudonyme\u202f; il reste dans ce navigateur, jusqu’à ce que le champ soit vidé",
+  "sheet.trainee_title": "Un nom ou un pseudonyme\u202f; il reste dans ce navigateur, jusqu’à ce que le champ soit vidé\u202f; un cours que vous rejoignez le voit",
   "sheet.print": "Imprimer la séance",
   "sheet.print_title": "Une page\u00a0: nom, date, chaque essai, la raison d’un échec, une ligne pour signer",
   "sheet.date": "Date",
