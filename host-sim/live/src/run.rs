@@ -32,6 +32,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use training::debrief;
+use training::language::Language;
 
 /// Run a virtual or real device, show it and record it.
 ///
@@ -350,9 +351,11 @@ fn address(text: &str) -> Result<SocketAddr, String> {
 
 /// Serves the page, with the debrief of what is recorded in the page.
 fn serve_for_practice(session: Session, address: SocketAddr) -> Result<visualizer::Server, Error> {
-    let write: visualizer::Debrief = Arc::new(|file| {
+    let write: visualizer::Debrief = Arc::new(|file, language| {
+        let language = Language::find(language.unwrap_or("en"))?;
         let attempts = debrief::attempts(&Recording::read(file)?, None)?;
-        debrief::html(&attempts, &[]).ok_or_else(|| without_insertion(file))
+        let html = debrief::html(&attempts, &[]).ok_or_else(|| without_insertion(file))?;
+        Ok(language.page(&html))
     });
     let server = visualizer::serve_with_reports(session, address, write, demonstration::page)
         .map_err(Error::failed)?;

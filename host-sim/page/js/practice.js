@@ -2,7 +2,7 @@
 // recording and the learning curve. The server judges; see host-sim/training/src/verdict.rs.
 
 import { LearningCurve } from "./learning_curve.js";
-import { number, said, t } from "./language.js";
+import { language, number, said, t } from "./language.js";
 import { SessionSheet } from "./session_sheet.js";
 import { Tasks } from "./tasks.js";
 
@@ -29,6 +29,7 @@ export class Practice {
     this.tasks = new Tasks(link);
     this.curve = new LearningCurve(byId("curve"), colours);
     this.sheet = new SessionSheet((message) => link.send(message), () => ({ attempts: this.own(), goal: byId("goal").textContent, words: byId("curve").dataset.words ?? "", curve: byId("curve") }));
+    byId("debrief").search = `language=${language}`;
     this.record = byId("record");
     this.name = byId("record-name");
     this.record.addEventListener("click", () => this.askForRecording());

@@ -45,6 +45,31 @@ fn a_venepuncture_is_scored_and_debriefed() {
     refused(&run(&["debrief", "/no/such.mcap", "--out", text(&out)]), 2, &["/no/such.mcap"]);
 }
 
+/// But for names, no words of a debrief in another language are as in English.
+#[test]
+fn a_debrief_is_in_german_and_in_french() {
+    let (file, _) = scored("languages", &["--seconds", "12"]);
+    let words = |language: &str| {
+        let out = folder(&format!("debrief-{language}"));
+        run_well(&["debrief", text(&file), text(&file), "--language", language, "--out", text(&out)]);
+        let page = std::fs::read_to_string(out.join("debrief.html")).expect("written");
+        let (_, body) = page.split_once("</style>").expect("a style");
+        let texts = body.split('>').filter_map(|part| part.split_once('<')).map(|(text, _)| text.to_owned());
+        texts.filter(|text| text.chars().any(char::is_alphabetic)).collect::<Vec<_>>()
+    };
+    let english = words("en");
+    assert!(english.len() > 60, "{english:?}");
+    for (language, same) in [("de", &["5 mm"][..]), ("fr", &["5 mm", "Angle", "force, N"])] {
+        let others = words(language);
+        assert_eq!(others.len(), english.len(), "{language}");
+        for (ours, theirs) in english.iter().zip(&others) {
+            let is_name = ours.contains(".mcap") || same.contains(&ours.as_str());
+            assert!(ours != theirs || is_name, "{language}: {ours}");
+        }
+    }
+    refused(&run(&["debrief", text(&file), "--language", "pl", "--out", "x"]), 2, &["--language", "pl"]);
+}
+
 /// A needle driven through the far wall and off the patient's angle, compared with the scripted
 /// venepuncture.
 #[test]
