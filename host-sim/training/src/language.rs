@@ -1,6 +1,6 @@
 //! The pages of this crate in the languages of the trainee's page. They are written in English, and
 //! each text between two tags is then looked up in the page's own files of texts
-//! (`host-sim/page/js/strings`): as it stands, or as a pattern with places for values.
+//! (`host-sim/page/js/strings`): as it is, or as a pattern with places for values.
 
 use device_sim::error::Error;
 use html_report::safe;

@@ -1,6 +1,6 @@
 //! Insertions as statements of the Experience API 1.0.3 (xAPI), which a learning record store takes
-//! as a JSON array. The id of a statement follows from what it says: a store takes an insertion once,
-//! however often it is sent.
+//! as a JSON array. The id of a statement follows from what it says: a store takes an insertion
+//! once, however often it is sent.
 
 use crate::score::{Insertion, each};
 use control_core::TICK_HZ;

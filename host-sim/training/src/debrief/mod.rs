@@ -78,8 +78,8 @@ fn attempt(
     }
 }
 
-/// The page in English; none of no attempt. The first and the last are compared, or an expert's best and the
-/// last, over the anatomy of the last one's patient.
+/// The page in English; none of no attempt. The first and the last are compared, or an expert's
+/// best and the last, over the anatomy of the last one's patient.
 pub fn html(attempts: &[Attempt], expert: &[Attempt]) -> Option<String> {
     let patient = &attempts.last()?.patient;
     let scene = patient.scene(Source::Virtual, None);
