@@ -98,6 +98,7 @@ pub(crate) enum Direction {
 pub(crate) struct Movement {
     direction: Direction,
     has_stopped: bool,
+    is_turning: bool,
     /// The furthest place in this direction; at rest, where the rest began.
     furthest: Millimetres,
     quiet_looks: u32,
@@ -108,6 +109,7 @@ impl Default for Movement {
         Self {
             direction: Direction::Rests,
             has_stopped: true,
+            is_turning: false,
             furthest: Millimetres::default(),
             quiet_looks: 0,
         }
@@ -126,6 +128,11 @@ impl Movement {
         self.has_stopped
     }
 
+    /// True if the needle had come back by 0.1 mm by the last look.
+    pub(crate) fn is_turning(&self) -> bool {
+        self.is_turning
+    }
+
     /// Follows the tip, every [`LOOK_TICKS`].
     pub(crate) fn look(&mut self, depth: Millimetres) {
         let off = depth.0.saturating_sub(self.furthest.0).to_bits();
@@ -139,9 +146,9 @@ impl Movement {
         } else if self.quiet_looks == QUIET_LOOKS {
             (self.direction, self.furthest) = (Direction::Rests, depth);
         }
-        let is_turning = off.unsigned_abs() >= TURNING;
+        self.is_turning = off.unsigned_abs() >= TURNING;
         self.has_stopped =
-            self.direction == Direction::Rests || self.quiet_looks > STOPPED_LOOKS && !is_turning;
+            self.direction == Direction::Rests || self.quiet_looks > STOPPED_LOOKS && !self.is_turning;
     }
 }
 

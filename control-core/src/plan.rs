@@ -116,6 +116,18 @@ impl Plan {
         layers::check_line(self, line)
     }
 
+    /// Returns the line of a needle that has not turned: the layers of the patient, and of a vessel
+    /// the height at which the needle goes through it beside its axis.
+    pub fn own_line(&self) -> NeedleLine {
+        let mut line = NeedleLine { depths: self.patient().layers.iter().map(|layer| layer.depth).collect() };
+        for met in &self.anatomy.layers {
+            if let Some(depth) = line.depths.get_mut(usize::from(met.number)) {
+                *depth = met.depth;
+            }
+        }
+        line
+    }
+
     /// The configuration that this came from.
     pub fn config(&self) -> &Config {
         &self.config

@@ -3,9 +3,10 @@
 
 use device_sim::device::virtual_device::VirtualDevice;
 use device_sim::driver::Driver;
+use device_sim::lockstep;
+use device_sim::needle::LineSender;
 use device_sim::procedure::Procedure;
 use device_sim::profile::Profile;
-use link::codec::MAX_FRAME;
 use std::time::Duration;
 
 fn main() {
@@ -16,28 +17,18 @@ fn main() {
     let procedure = Procedure::find("venepuncture", &profile).expect("it is built in");
     let mut device = VirtualDevice::new(&profile, procedure);
     let mut driver = Driver::new(profile.config.patient.clone());
+    let mut needle = LineSender::new(&profile);
     driver.connected(Duration::ZERO);
     let mut hash = 0xCBF2_9CE4_8422_2325_u64;
-    let mut bytes = [0; MAX_FRAME];
+    let mut hear = |bytes: &[u8]| {
+        hash = bytes.iter().fold(hash, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01B3));
+    };
     while device.ticks() < ticks {
-        let now = Duration::from_micros(device.ticks() * 100);
-        if driver.is_ready(now) && !driver.has_started() && !driver.is_starting() {
+        let is_ready = driver.is_ready(lockstep::time(device.ticks()));
+        if is_ready && !driver.has_started() && !driver.is_starting() {
             driver.start();
         }
-        device.receive(driver.transmit(now));
-        for _ in 0..10 {
-            device.tick();
-        }
-        loop {
-            let count = device.transmit(&mut bytes);
-            if count == 0 {
-                break;
-            }
-            for byte in &bytes[..count] {
-                hash = (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01B3);
-            }
-            driver.receive(now, &bytes[..count], |_| {});
-        }
+        lockstep::exchange(&mut device, &mut driver, Some(&mut needle), &mut hear, |_| {});
     }
     println!("{hash:016x}");
 }

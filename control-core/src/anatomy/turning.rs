@@ -14,8 +14,8 @@ const SMOOTHING: u32 = 5;
 /// The angle follows what is smoothed once it is this far off: 0.75 mrad in Q16.
 const DEAD_BAND: u32 = 49_152;
 
-/// A new angle on its way, a part in each of four ticks: all of it in one would make that tick the
-/// longest of all.
+/// A new angle on its way, a part in each of four or five ticks: all of it in one would make that
+/// tick the longest of all.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) enum Turning {
     /// The angle that was taken over holds.
@@ -27,6 +27,8 @@ pub(super) enum Turning {
     Sine(Milliradians, I2F30),
     /// All that there is to know of it.
     Whole(Angle),
+    /// Those that the tip has touched turn with the needle.
+    Carried(Angle),
     /// And the layers begin at [`Insertion::next_tops`] then.
     Placed(Angle),
     /// The angle stays, and this layer is to go towards where the needle's line meets it.
@@ -111,6 +113,13 @@ impl Insertion {
             Turning::Whole(angle) => {
                 for (top, depth) in self.next_tops.iter_mut().zip(self.depths) {
                     *top = angle.along(Millimetres(depth));
+                }
+                if self.line.carries { Turning::Carried(angle) } else { Turning::Placed(angle) }
+            }
+            Turning::Carried(angle) => {
+                let layers = self.next_tops.iter_mut().zip(&mut self.depths).zip(self.tops);
+                for ((next, depth), top) in layers.take(self.touched) {
+                    (*next, *depth) = (top, angle.below_skin(top));
                 }
                 Turning::Placed(angle)
             }

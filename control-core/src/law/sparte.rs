@@ -7,17 +7,20 @@
 //!
 //! Tracking wall: `z = x − w`, `w` dragged so that `−F_out/K ≤ z ≤ F_in/K`, `F = K·z`. A needle
 //! that has not gone on for 20 ms has stopped: `w` comes after it with a time constant until only
-//! the friction that holds the needle is left. Where a wall of the anatomy gives way, the tip cuts
-//! already: `w` is put where it makes a share of the cutting force, so that the force falls below
-//! that and rises to it again. LuGre (Canudas de Wit 1995): `ż = v − σ₀|v|z/g`, `g = F_c + (F_s −
-//! F_c)e^{−(v/v_s)²}`, `F = σ₀z + σ₁ż + σ₂v`, stepped implicitly over the tick's own travel Δx,
-//! `z⁺ = (z + Δx)(1 − σ₀|Δx|/(g + σ₀|Δx|))`, which is stable at any speed.
+//! the friction that holds the needle is left, and makes up for those 20 ms 20 ms later: a needle
+//! that turns round has gone on by then. The force that relaxes lets a compliant hand creep on: the
+//! needle stays at rest until it stretches the wall again or turns round. Where a wall of the
+//! anatomy gives way, the tip cuts already: `w` is put where it makes a share of the cutting force,
+//! so that the force falls below that and rises to it again. LuGre (Canudas de Wit 1995):
+//! `ż = v − σ₀|v|z/g`, `g = F_c + (F_s − F_c)e^{−(v/v_s)²}`, `F = σ₀z + σ₁ż + σ₂v`, stepped
+//! implicitly over the tick's own travel Δx, `z⁺ = (z + Δx)(1 − σ₀|Δx|/(g + σ₀|Δx|))`, which is
+//! stable at any speed.
 
 use super::{ForceLimits, LayerHit, Motion, Response, follow_share, reach};
 use crate::anatomy::Insertion;
 use crate::anchor::Anchor;
 use crate::event::State;
-use crate::kinematics::Direction;
+use crate::kinematics::{Direction, Movement};
 use crate::math::{exp_negative, saturating_multiply, share, truncating_product};
 use crate::passivity::Elements;
 use crate::refusal::{Field, Refusal, count, milli, within};
@@ -28,6 +31,12 @@ use fixed::types::{I2F30, I8F24, I16F16};
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
+/// Ticks for which the wall follows at twice its pace: as many as a stop takes to be noticed, and
+/// after as many, for a needle that turns round looks stopped for a moment too.
+const CATCH_UP_TICKS: u16 = 200;
+/// A needle at rest goes on once it has stretched the wall by this much again: 0.15 mm, more than a
+/// hand trembles.
+const GOES_ON: I16F16 = I16F16::from_bits(9_830);
 /// Further than this the tip does not go in a tick; more is an encoder fault: 16 mm.
 const LARGEST_STEP: i32 = 16 << 16;
 /// Faster than this no law is held to what the motor gives: 50 mm/s.
@@ -159,11 +168,21 @@ impl PreparedSparte {
     }
 }
 
+/// A needle that has stopped, while the wall follows it.
+#[derive(Clone, Copy, Debug)]
+struct Rest {
+    /// The smallest stretch of the wall since then, without its sign.
+    least: I16F16,
+    /// Ticks until the wall has caught up.
+    catching_up: u16,
+}
+
 /// The needle's history so far.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Memory {
     /// w.
     wall: Anchor,
+    rest: Option<Rest>,
     /// Walls that had given way.
     given: usize,
     /// z of LuGre.
@@ -190,6 +209,7 @@ impl Memory {
         if met.given() < prepared.walls_that_close || depth.0 < met.top(0) {
             self.wall.release(depth);
             self.bristles = I8F24::ZERO;
+            self.rest = None;
             self.entry = None;
             self.is_beyond = false;
             self.given = met.given();
@@ -205,14 +225,14 @@ impl Memory {
             self.wall.release(Millimetres(depth.0.saturating_sub(reach(left.0, prepared.inverse_tracking))));
         }
         self.given = met.given();
-        let (cutting, is_full) = self.track(config, prepared, cut, elastic, (depth, movement.has_stopped()));
+        let (cutting, is_full) = self.track(config, prepared, cut, elastic, (depth, movement));
         let friction = self.rub(&prepared.rub, step, speed);
         let (lateral, barrier) = self.hold_direction(&config.fixture, met.angle());
         let state = if movement.direction() == Direction::Out {
             State::Withdrawal
         } else if pressed.is_some() {
             State::Elastic
-        } else if !is_full && movement.direction() == Direction::In {
+        } else if !is_full && self.rest.is_none() && movement.direction() == Direction::In {
             State::Puncture
         } else {
             State::Friction
@@ -229,7 +249,7 @@ impl Memory {
         prepared: &PreparedSparte,
         cut: Cutting,
         elastic: I16F16,
-        (depth, has_stopped): (Millimetres, bool),
+        (depth, movement): (Millimetres, &Movement),
     ) -> (I16F16, bool) {
         let inwards =
             reach(cut.inwards.0.saturating_sub(elastic).max(I16F16::ZERO), prepared.inverse_tracking);
@@ -237,12 +257,34 @@ impl Memory {
         self.wall.drag(depth, inwards, reach(cut.outwards.0, prepared.inverse_tracking));
         let stretch = self.wall.stretch(depth);
         let held = reach(prepared.rub.sliding, prepared.inverse_tracking);
-        if has_stopped && stretch.unsigned_abs() > held.unsigned_abs() {
+        if let Some(paces) = self.rest(stretch, movement)
+            && stretch.unsigned_abs() > held.unsigned_abs()
+        {
             let held = if stretch < I16F16::ZERO { -held } else { held };
-            self.wall.follow(depth.0.saturating_sub(held), prepared.relax);
+            self.wall.follow(depth.0.saturating_sub(held), prepared.relax * paces);
         }
         let force = saturating_multiply(self.wall.stretch(depth), config.tracking.0);
         (force, is_full)
+    }
+
+    /// Returns the pace at which the wall follows a needle that rests, in its own.
+    fn rest(&mut self, stretch: I16F16, movement: &Movement) -> Option<i32> {
+        let has_stopped = movement.has_stopped();
+        if self.rest.is_none() && !has_stopped {
+            return None;
+        }
+        let stretch = stretch.saturating_abs();
+        let starts = Rest { least: stretch, catching_up: 2 * CATCH_UP_TICKS };
+        let rest = self.rest.get_or_insert(starts);
+        rest.least = rest.least.min(stretch);
+        let goes_on = movement.is_turning() || stretch > rest.least.saturating_add(GOES_ON);
+        if !has_stopped && goes_on {
+            self.rest = None;
+            return None;
+        }
+        let left = rest.catching_up;
+        rest.catching_up = left.saturating_sub(1);
+        Some(1 + i32::from((1..=CATCH_UP_TICKS).contains(&left)))
     }
 
     /// LuGre over a step of `step` mm, in Q16.

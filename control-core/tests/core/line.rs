@@ -245,6 +245,34 @@ fn what_a_line_would_do_the_needle_does() {
     assert_eq!(contact, 1 << 2, "with the next count");
 }
 
+/// A needle in the vein is lowered by 10° in 1.4 s about the vein's wall and advanced: it has left
+/// nothing and meets nothing again.
+#[test]
+fn what_the_tip_has_passed_turns_with_the_needle() {
+    let sine = |degrees: f64| degrees.to_radians().sin();
+    let tilt = |degrees: f64| Milliradians((degrees.to_radians() * 1e3).round() as i16);
+    let mut needle = Needle::new(&Config::commissioned_virtual(), tilt(25.0));
+    needle.go(13.4, 20.0, |_| {});
+    assert_eq!(needle.rest(0.2).vessel, VesselState::InLumen);
+    let [fat_mm, wall_mm] = [2.0, 4.8].map(|depth| depth / sine(25.0));
+    for step in 0..=100 {
+        let degrees = 25.0 - 0.1 * f64::from(step);
+        needle.tilt = tilt(degrees);
+        let far_mm = wall_mm + 3.0 / sine(degrees);
+        let met = [0.0, fat_mm, wall_mm, far_mm].map(|mm| mm * sine(degrees));
+        needle.core.take_line(&line(met).depths);
+        for _ in 0..TICKS {
+            let out = needle.tick();
+            assert_eq!(
+                (out.transitions, out.vessel),
+                (Default::default(), VesselState::InLumen),
+                "{degrees}°"
+            );
+        }
+    }
+    needle.go(16.4, 5.0, |out| assert_eq!(out.transitions, Default::default()));
+}
+
 /// One that the link lets through for another patient, and one that is refused.
 #[test]
 fn a_line_for_another_patient_changes_nothing() {

@@ -5,10 +5,11 @@
 //! person asks: no set value of an earlier connection is ever played again. Commands are repeated
 //! until they are answered; a heartbeat says every 50 ms that the PC lives.
 
+use crate::needle::LineSender;
 use control_core::compensation::Gains;
 use control_core::event::Fault;
 use control_core::excitation::Excitation;
-use control_core::{Device, NeedleLine, Patient};
+use control_core::{Device, Patient};
 use link::codec::{self, MAX_FRAME};
 use link::frames::{Ack, Command, CommandRefusal, DeviceFrame, EventKind, GuardRefusal, PROTOCOL_VERSION};
 use link::host::{Commands, Counts, Reception};
@@ -200,11 +201,15 @@ impl Driver {
         self.waiting.push_back(Command::Compensate(gains));
     }
 
-    /// Tells the device where its needle, which has turned in tissue, meets the layers. Only the
-    /// latest line counts.
-    pub fn line(&mut self, line: NeedleLine) {
-        self.waiting.retain(|command| !matches!(command, Command::Line(_)));
-        self.waiting.push_back(Command::Line(line));
+    /// Tells the device at `now` where `needle` meets the layers, if it has turned in tissue. Only
+    /// the latest line counts.
+    pub fn follow(&mut self, now: Duration, needle: &mut LineSender) {
+        if self.is_ready(now)
+            && let Some(line) = needle.due(now)
+        {
+            self.waiting.retain(|command| !matches!(command, Command::Line(_)));
+            self.waiting.push_back(Command::Line(line));
+        }
     }
 
     /// Sets the counts past the zero at which the rotor's angle is zero.

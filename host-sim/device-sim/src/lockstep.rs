@@ -2,8 +2,12 @@
 //! then what each has for the other. The clock of both is the device's, so that a busy computer
 //! slows both and neither finds the other silent.
 
+use crate::device::virtual_device::VirtualDevice;
+use crate::driver::Driver;
+use crate::needle::LineSender;
 use control_core::TICK_HZ;
 use link::codec::MAX_FRAME;
+use link::frames::DeviceFrame;
 use std::time::Duration;
 
 /// Ticks between two exchanges: 1 ms.
@@ -23,5 +27,36 @@ pub fn empty(mut transmit: impl FnMut(&mut [u8; MAX_FRAME]) -> usize, mut take: 
             0 => return,
             count => take(&frame[..count]),
         }
+    }
+}
+
+/// Moves a device and the driver of its link on by one exchange, with the needle that is followed
+/// in the patient: it tells where bone stops the tip. `hear` gets every byte that the device sends,
+/// `see` every frame.
+pub fn exchange(
+    device: &mut VirtualDevice,
+    driver: &mut Driver,
+    mut needle: Option<&mut LineSender>,
+    mut hear: impl FnMut(&[u8]),
+    mut see: impl FnMut(&DeviceFrame),
+) {
+    let now = time(device.ticks());
+    device.receive(driver.transmit(now));
+    for _ in 0..TICKS {
+        device.tick();
+    }
+    empty(
+        |frame| device.transmit(frame),
+        |bytes| {
+            hear(bytes);
+            driver.receive(now, bytes, |frame| {
+                see(frame);
+                needle.iter_mut().for_each(|needle| needle.frame(frame));
+            });
+        },
+    );
+    if let Some(needle) = needle {
+        driver.follow(now, needle);
+        device.meet_bone(needle.track().bone_mm());
     }
 }

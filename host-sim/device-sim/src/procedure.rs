@@ -8,7 +8,7 @@ pub mod purpose;
 use crate::error::Error;
 use crate::named_files::{self, Text};
 use crate::plant::hand::Grip;
-use crate::profile::{Entry, Profile, TissueName, puncture_path_mm};
+use crate::profile::{self, Entry, Profile, TissueName, puncture_path_mm};
 use control_core::config::Tissue;
 use purpose::Purpose;
 use serde::Deserialize;
@@ -171,6 +171,16 @@ impl Procedure {
             turned_rad: m.from_rad + (m.to_rad - m.from_rad) * path,
         }
     }
+}
+
+/// The procedure of a page, with its list of steps.
+const PRACTISED: &str = "cannulation";
+
+/// Returns the procedure with which a page begins in a patient: its own, and where its file names
+/// none, a cannulation with its list of steps.
+pub fn of_page(profile: &Profile) -> String {
+    let own = profile.procedure.as_str();
+    if own == profile::USUAL_PROCEDURE { PRACTISED.to_owned() } else { own.to_owned() }
 }
 
 /// The text of a built-in procedure by its name, or of a file by its path.

@@ -14,7 +14,7 @@ use device_sim::device::device_config::DeviceConfig;
 use device_sim::device::virtual_device::VirtualDevice;
 use device_sim::driver::Driver;
 use device_sim::error::Error;
-use device_sim::procedure::Procedure;
+use device_sim::procedure::{self, Procedure};
 use device_sim::profile::{Model, Profile};
 use device_sim::session::{self, Session, Source, Subscription};
 use recording::messages::Setup;
@@ -32,6 +32,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use training::debrief;
+use training::language::Language;
 
 /// Run a virtual or real device, show it and record it.
 ///
@@ -50,12 +51,12 @@ pub struct Run {
     device: String,
     /// Procedure of the scripted hand: venepuncture, slow, shoulder-straight, insertion-5mms-60deg
     /// …, or a TOML file like those in host-sim/procedures; without it, the one in the patient's
-    /// file
+    /// file, and a cannulation on the page where that names none
     #[arg(long, value_name = "NAME|FILE")]
     procedure: Option<String>,
-    /// The patient: adult, thin-elderly, high-body-mass, firm-skin, dorsal-hand, shoulder, phantom,
-    /// those with a body in three dimensions (shoulder-joint, forearm, knee, hip), or a TOML file
-    /// like those in host-sim/profiles; without it, adult, or the default one of --model
+    /// The patient: adult, thin-elderly, high-body-mass, firm-skin, dorsal-hand, child, shoulder,
+    /// phantom, those with a body in three dimensions (shoulder-joint, forearm, knee, hip), or a
+    /// TOML file like those in host-sim/profiles; without it, adult, or the default one of --model
     #[arg(long, value_name = "NAME|FILE")]
     profile: Option<String>,
     /// The device's construction: a TOML file as commissioning writes it, or paper-001; without it,
@@ -188,7 +189,10 @@ impl Run {
             Some(degrees) => profile.at_angle(degrees)?,
             None => profile,
         };
-        let wanted = self.procedure.clone().unwrap_or_else(|| profile.procedure.clone());
+        // An angle that a person has asked for is not the one of a cannulation.
+        let is_page = !self.headless && self.angle.is_none();
+        let own = if is_page { procedure::of_page(&profile) } else { profile.procedure.clone() };
+        let wanted = self.procedure.clone().unwrap_or(own);
         let (procedure, profile) = Procedure::entering(&wanted, profile)?;
         Ok(Chosen { part, profile, wanted, procedure })
     }
@@ -347,9 +351,11 @@ fn address(text: &str) -> Result<SocketAddr, String> {
 
 /// Serves the page, with the debrief of what is recorded in the page.
 fn serve_for_practice(session: Session, address: SocketAddr) -> Result<visualizer::Server, Error> {
-    let write: visualizer::Debrief = Arc::new(|file| {
+    let write: visualizer::Debrief = Arc::new(|file, language| {
+        let language = Language::find(language.unwrap_or("en"))?;
         let attempts = debrief::attempts(&Recording::read(file)?, None)?;
-        debrief::html(&attempts, &[]).ok_or_else(|| without_insertion(file))
+        let html = debrief::html(&attempts, &[]).ok_or_else(|| without_insertion(file))?;
+        Ok(language.page(&html))
     });
     let server = visualizer::serve_with_reports(session, address, write, demonstration::page)
         .map_err(Error::failed)?;

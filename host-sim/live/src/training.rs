@@ -7,6 +7,7 @@ use device_sim::patients;
 use device_sim::profile::{BUILT_IN, Profile};
 use std::path::{Path, PathBuf};
 use training::debrief;
+use training::language::Language;
 use training::score::{Insertion, score};
 use training::xapi::statements;
 
@@ -29,8 +30,8 @@ pub struct Score {
     /// Print xAPI statements for a learning record store, as a JSON array
     #[arg(long, conflicts_with = "json", requires = "actor")]
     xapi: bool,
-    /// The trainee's e-mail address, for --xapi
-    #[arg(long, value_name = "E-MAIL", requires = "xapi")]
+    /// The trainee's e-mail address or a pseudonym, for --xapi
+    #[arg(long, value_name = "E-MAIL|NAME", requires = "xapi")]
     actor: Option<String>,
 }
 
@@ -48,6 +49,9 @@ pub struct Debrief {
     /// An expert's recording: the last attempt is compared with the best insertion in it
     #[arg(long, value_name = "FILE.mcap")]
     expert: Option<PathBuf>,
+    /// The language of the page: en, de or fr
+    #[arg(long, value_name = "TAG", default_value = "en")]
+    language: String,
     /// Folder to write debrief.html to; created if missing
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -154,6 +158,7 @@ fn print_total(all: &[Insertion]) {
 
 impl Debrief {
     pub(crate) fn run(self) -> Result<(), Error> {
+        let language = Language::find(&self.language)?;
         let given = self.profile.as_deref().map(Profile::find).transpose()?;
         let mut attempts = Vec::new();
         for file in &self.files {
@@ -176,7 +181,7 @@ impl Debrief {
             ))
         })?;
         let page = self.out.join("debrief.html");
-        std::fs::write(&page, html).map_err(|cause| {
+        std::fs::write(&page, language.page(&html)).map_err(|cause| {
             Error::failed(format_args!(
                 "{}: cannot be written ({cause}); choose another --out",
                 page.display()

@@ -123,14 +123,13 @@ export class BodyView {
 
   /** The needle as the device has it. */
   needle() {
-    const { depth, angle, tilt, vessel } = this.view;
-    return { depth, angle: angle ?? tilt - this.scene.skin_tilt_rad, flashback: vessel === "in_lumen" };
+    const { depth, angle, tilt, vessel, originX, originY } = this.view;
+    return { depth, angle: angle ?? tilt - this.scene.skin_tilt_rad, origin: [originX, originY], flashback: vessel === "in_lumen" };
   }
 
   /** A fixed step at 60 pictures a second; where pictures come slower, the tissue keeps up. */
   step(seconds) {
-    const { depth, angle } = this.needle();
-    this.picture.step(Math.min(Math.max(seconds, 1 / 120), 1 / 20), depth, angle);
+    this.picture.step(Math.min(Math.max(seconds, 1 / 120), 1 / 20), this.needle());
   }
 
   /** Moves the tissue on for a headset; what it draws. */
@@ -157,6 +156,7 @@ export class BodyView {
     this.stats.stepMs = stepped - begin;
     this.stats.drawMs = drawn - stepped;
     this.stats.imageMs = performance.now() - drawn;
+    this.stats.needle = this.needle();
     this.stats.share = this.ultrasound.seen?.share ?? NaN;
     this.stats.frames++;
   }

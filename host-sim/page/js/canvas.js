@@ -28,8 +28,8 @@ export function surface(canvas) {
 }
 
 const NAMES = [
-  "panel", "line", "text", "muted", "depth", "force", "motor", "grid", "sky", "skin", "skin-edge", "fat", "muscle",
-  "bursa", "tendon", "cartilage", "other", "ruler", "ruler-edge", "vessel-wall", "vessel-edge", "lumen", "fibre", "on-tissue", "steel-light", "steel", "steel-dark", "grip",
+  "panel", "line", "good", "bad", "text", "muted", "depth", "force", "motor", "grid", "sky", "skin", "skin-edge", "fat", "muscle",
+  "bursa", "tendon", "cartilage", "other", "ruler", "ruler-edge", "vessel-wall", "vessel-edge", "lumen", "haematoma", "catheter", "fibre", "on-tissue", "steel-light", "steel", "steel-dark", "grip",
 ];
 
 /** The colours by name, and again whenever light changes to dark. */

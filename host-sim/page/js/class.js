@@ -3,10 +3,12 @@
 // What arrives was said by other computers: it is written as text and drawn as numbers, and a card that cannot be drawn says so.
 
 import { colours } from "./canvas.js";
-import { number } from "./language.js";
+import { begin, count as whole, number, said, t, translate } from "./language.js";
 import { Link } from "./link.js";
 import { Section } from "./section.js";
 import { Tissue } from "./tissue.js";
+
+begin();
 
 const byId = (id) => document.getElementById(id);
 const palette = colours();
@@ -20,8 +22,9 @@ class Card {
   constructor(name) {
     this.element = byId("card").content.firstElementChild.cloneNode(true);
     this.element.dataset.name = name;
+    translate(this.element);
     const find = (selector) => this.element.querySelector(selector);
-    write(find("h2"), name);
+    this.heading = find("h2");
     this.chip = find(".chip");
     this.reason = find(".reason");
     this.canvas = find("canvas");
@@ -56,24 +59,25 @@ class Card {
   tell(member) {
     const [state, words, tone] = condition(member);
     this.element.dataset.state = state;
+    write(this.heading, member.trainee ? `${member.name} · ${member.trainee}` : member.name);
     this.chip.dataset.tone = tone;
     write(this.chip.lastElementChild, words);
-    write(this.reason, member.gone ? "" : member.stuck ?? "");
+    write(this.reason, member.gone ? "" : said(member.stuck ?? ""));
     const { score, pose } = member;
     const last = score.last;
     const figures = {
       depth: pose ? `${number(pose.depth_mm, 1)} mm` : "–",
       force: pose ? `${number(pose.motor_n, 2)} N` : "–",
-      insertions: String(score.insertions),
-      passed: String(score.passed),
-      goal: last?.verdict.goal ?? "–",
-      reasons: last?.verdict.reasons.map((reason) => reason.words).join("; ") || "–",
+      insertions: whole(score.insertions),
+      passed: whole(score.passed),
+      goal: last ? said(last.verdict.goal) : "–",
+      reasons: last?.verdict.reasons.map((reason) => said(reason.words)).join("; ") || "–",
       last: last ? `${number(last.time_s, 1)} s, ${number(last.peak_force_n, 2)} N` : "–",
-      patient: this.scene ? `Patient ${this.scene.profile}` : "",
-      recording: member.recording ? "Recording" : "Not recording",
+      patient: this.scene ? t("class.patient", { name: this.scene.profile }) : "",
+      recording: t(member.recording ? "state.recording" : "recording.off"),
     };
     for (const [name, text] of Object.entries(figures)) write(this.figures[name], text);
-    this.canvas.setAttribute("aria-label", `Needle of ${member.name}, ${figures.depth} deep`);
+    this.canvas.setAttribute("aria-label", t("class.needle", { name: member.name, depth: figures.depth }));
   }
 
   /** The same section as the trainee's own page, smaller. */
@@ -88,18 +92,19 @@ class Card {
 
 /** Returns a card's title, in words, and its tone. */
 function condition(member) {
-  if (member.gone) return ["gone", `Gone for ${Math.floor(member.silent_s)} s`, "off"];
-  if (!member.connected) return ["stuck", "Device silent", "warn"];
-  if (member.stuck?.startsWith("fault")) return ["fault", "Fault", "bad"];
-  if (member.stuck) return ["stuck", "Stuck", "warn"];
-  return ["here", "Here", "good"];
+  if (member.gone) return ["gone", t("class.gone_for", { seconds: Math.floor(member.silent_s) }), "off"];
+  if (!member.connected) return ["stuck", t("link.silent"), "warn"];
+  if (member.stuck?.startsWith("fault")) return ["fault", t("class.fault"), "bad"];
+  if (member.stuck) return ["stuck", t("class.stuck"), "warn"];
+  return ["here", t("class.here"), "good"];
 }
 
 function receive(message) {
   if (message.type !== "class") return;
-  write(byId("class-name"), `Class ${message.name}`);
-  document.title = `Class ${message.name}`;
-  write(byId("subtitle"), `Devices join with run --class ${message.name} --class-at ${message.address}`);
+  const title = t("class.name", { name: message.name });
+  write(byId("class-name"), title);
+  document.title = title;
+  write(byId("subtitle"), t("class.join", { command: `run --class ${message.name} --class-at ${message.address}` }));
   const count = { here: 0, stuck: 0, gone: 0 };
   for (const member of message.members) {
     let card = cards.get(member.name);
@@ -113,9 +118,9 @@ function receive(message) {
     count[state === "fault" ? "stuck" : state] += 1;
   }
   byId("nobody").hidden = message.members.length > 0;
-  write(byId("here"), `${count.here + count.stuck} here`);
-  write(byId("stuck"), `${count.stuck} stuck`);
-  write(byId("gone"), `${count.gone} gone`);
+  write(byId("here"), t("class.count_here", { count: count.here + count.stuck }));
+  write(byId("stuck"), t("class.count_stuck", { count: count.stuck }));
+  write(byId("gone"), t("class.count_gone", { count: count.gone }));
   byId("stuck-chip").dataset.tone = count.stuck ? "warn" : "off";
   byId("gone-chip").dataset.tone = count.gone ? "warn" : "off";
 }
@@ -125,7 +130,7 @@ function attempt(card, what) {
   try {
     what();
   } catch {
-    write(card.reason, "The page does not understand this device's messages: it may run another version.");
+    write(card.reason, t("class.other_version"));
   }
 }
 
@@ -139,7 +144,7 @@ function draw(nowMs) {
   const here = link.open;
   document.body.dataset.link = here ? "live" : "lost";
   byId("banner").hidden = here;
-  write(byId("banner"), here ? "" : "Program unreachable. Reconnecting.");
+  write(byId("banner"), here ? "" : t("banner.lost"));
   requestAnimationFrame(draw);
 }
 

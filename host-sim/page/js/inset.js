@@ -24,7 +24,7 @@ export function drawInset(g, colours, { right, wide, high }, tissue, tipDepth, n
   g.fillStyle = colours[tissue.around] ?? colours.other;
   g.fillRect(left, top, wide, high);
   g.beginPath();
-  g.ellipse(centre.x, centre.y, (vessel.width_mm / 2) * s, (vessel.height_mm / 2) * s, 0, 0, 2 * Math.PI);
+  g.ellipse(centre.x, centre.y, (vessel.width_mm / 2) * s, ((tissue.vein.height * vessel.height_mm) / 2) * s, 0, 0, 2 * Math.PI);
   g.fillStyle = colours.lumen;
   g.fill();
   g.strokeStyle = colours["vessel-wall"];

@@ -1,5 +1,5 @@
 // The language of the page: its texts by their keys and its numbers. The person's own choice counts, then the languages of the browser,
-// then English. A page without a choice of languages (class, guide) is in English.
+// then English. A page without a choice of languages (the guide) is in English.
 
 import de from "./strings/de.js";
 import en from "./strings/en.js";
@@ -76,9 +76,9 @@ export function said(sentence) {
   return sentence;
 }
 
-function localised({ tissue, task, ...others }) {
+function localised({ tissue, task, cause, ...others }) {
   const values = Object.entries(others).map(([name, value]) => [name, value.replace(".", decimalPoint)]);
-  return { ...Object.fromEntries(values), tissue: tissue && tissueName(tissue), task: task && taskName(task) };
+  return { ...Object.fromEntries(values), tissue: tissue && tissueName(tissue), task: task && taskName(task), cause: cause && said(cause) };
 }
 
 function format(digits, useGrouping) {

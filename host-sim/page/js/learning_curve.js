@@ -1,4 +1,4 @@
-// The learning curve as a cumulative sum (Kestin, Br J Anaesth 1995; 75:805–809): each attempt that misses raises it, each that reaches
+// The attempts as marks, and behind a click the learning curve as a cumulative sum (Kestin, Br J Anaesth 1995; 75:805–809): each attempt that misses raises it, each that reaches
 // its goal lowers it. At the pass mark the rate of failure is the acceptable one and not the unacceptable one, at these rates of error.
 // 20 % was found acceptable there for arterial cannulation; as there, twice as much is not.
 
@@ -16,7 +16,8 @@ export const STEP = Q / (P + Q);
 /** The distance below its highest value that the sum has to reach. */
 export const PASS = Math.log((1 - ERROR) / ERROR) / (P + Q);
 
-/** The sum after each attempt, and after how many the pass mark was reached (0: not yet). */
+/** The sum after each attempt, after how many the pass mark was reached (0: not yet), and how many were reached in a row of how many
+ *  that are wanted in a row to pass. */
 export function cumulativeSum(reached) {
   let [sum, highest, passedAfter] = [0, 0, 0];
   const sums = reached.map((one, i) => {
@@ -25,7 +26,9 @@ export function cumulativeSum(reached) {
     if (!passedAfter && sum <= highest - PASS) passedAfter = i + 1;
     return sum;
   });
-  return { sums, mark: highest - PASS, passedAfter };
+  const inARow = reached.length - 1 - reached.lastIndexOf(false);
+  const missing = Math.max(0, Math.ceil((sum - (highest - PASS)) / STEP - 1e-9));
+  return { sums, mark: highest - PASS, passedAfter, inARow, wanted: inARow + missing };
 }
 
 export class LearningCurve {
@@ -36,20 +39,59 @@ export class LearningCurve {
     // After the colours have been read anew.
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.draw(this.attempts));
     this.attempts = [];
+    this.showsSum = false;
+    canvas.addEventListener("click", () => this.toggle());
+    canvas.addEventListener("keydown", (event) => ["Enter", " "].includes(event.key) && this.toggle(event));
   }
 
+  toggle(event) {
+    event?.preventDefault();
+    event?.stopPropagation();
+    this.showsSum = !this.showsSum;
+    this.draw(this.attempts);
+  }
+
+  /** Attempts as marks, newest at the right, and in words how many in a row are still wanted; a click shows the sum. */
   draw(attempts) {
     this.attempts = attempts;
     const { context: g, width, height, canvas } = this.surface;
-    const { sums, mark, passedAfter } = cumulativeSum(attempts.map((one) => one.figures.verdict.passed));
-    const words = passedAfter ? t("practice.passed", { count: passedAfter }) : t("practice.not_passed", { count: attempts.length });
+    const reached = attempts.map((one) => one.figures.verdict.passed);
+    const sum = cumulativeSum(reached);
+    const { inARow, wanted, passedAfter } = sum;
+    const words = passedAfter ? t("practice.passed", { count: passedAfter }) : t("practice.in_a_row", { count: inARow, wanted });
     canvas.setAttribute("aria-label", t("practice.curve_label", { words }));
+    canvas.dataset.words = words;
+    g.fillStyle = this.colours.panel;
+    g.fillRect(0, 0, width, height);
+    g.font = `12px ${this.colours.font}`;
+    g.fillStyle = this.colours.muted;
+    g.textBaseline = "top";
+    g.textAlign = "left";
+    g.fillText(words, 6, 2, width - 12);
+    // Where there is one line only, the marks follow the words.
+    const [left, top] = height < 44 ? [14 + g.measureText(words).width, 0] : [6, 18];
+    if (this.showsSum) this.sum(g, width, height, sum);
+    else this.marks(g, width - 6 - left, (top + height) / 2, left, reached);
+  }
+
+  marks(g, width, y, left, reached) {
+    const step = 18;
+    const fit = Math.max(1, Math.floor(width / step));
+    for (const [i, one] of reached.slice(-fit).entries()) {
+      g.beginPath();
+      g.arc(left + step * (i + 0.5), y, 6, 0, 2 * Math.PI);
+      g.fillStyle = g.strokeStyle = one ? this.colours.good : this.colours.bad;
+      g.lineWidth = 2;
+      g.stroke();
+      if (one) g.fill();
+    }
+  }
+
+  sum(g, width, height, { sums, mark }) {
     const [low, high] = [Math.min(mark, ...sums) - 0.3, Math.max(0, ...sums) + 0.3];
     const [left, right, top, bottom] = [6, width - 6, 18, height - 6];
     const x = (i) => left + ((right - left) * i) / Math.max(sums.length, 10);
     const y = (sum) => top + ((bottom - top) * (high - sum)) / (high - low);
-    g.fillStyle = this.colours.panel;
-    g.fillRect(0, 0, width, height);
     const rule = (at, colour, dash) => {
       g.strokeStyle = colour;
       g.lineWidth = 1;
@@ -68,13 +110,9 @@ export class LearningCurve {
     g.moveTo(x(0), y(0));
     sums.forEach((sum, i) => g.lineTo(x(i + 1), y(sum)));
     g.stroke();
-    g.font = `12px ${this.colours.font}`;
     g.fillStyle = this.colours.muted;
-    g.textBaseline = "top";
-    g.textAlign = "left";
-    const title = t("practice.curve_title", { words });
-    g.fillText(left + g.measureText(title).width < right ? title : words, left, 2, right - left);
     g.textAlign = "right";
+    g.fillText(t("practice.sum"), right, 2, width / 2);
     g.textBaseline = "bottom";
     g.fillStyle = this.colours.depth;
     g.fillText(t("practice.pass_mark"), right, y(mark) - 2);

@@ -142,9 +142,9 @@ function box() {
 }
 
 /** From the needle's own axes (x towards the tip) into the body. */
-export function along({ depth, angle }) {
+export function along({ depth, angle, origin: [x, z] }) {
   const [s, c] = [Math.sin(angle), Math.cos(angle)];
-  return [c, 0, s, 0, 0, 1, 0, 0, -s, 0, c, 0, depth * c, 0, depth * s, 1];
+  return [c, 0, s, 0, 0, 1, 0, 0, -s, 0, c, 0, x + depth * c, 0, z + depth * s, 1];
 }
 
 /** Clip space as WebGL has it, z from −1 to 1. */

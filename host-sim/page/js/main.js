@@ -39,7 +39,7 @@ let linkStatus = null;
 /** The newest state, which is drawn. */
 const view = {
   known: false, depth: -5, force: 0, motor: 0, speed: 0, torque: 0, peak: NaN, tilt: 0.5, angle: 0.5, skinAngle: 0.5, lateral: 0, vessel: "outside", state: "idle",
-  hand: 0, person: false, seconds: 0, ghost: NaN, originX: 0, originY: 0, underSkin: 0, next: "",
+  hand: 0, person: false, seconds: 0, ghost: NaN, originX: 0, originY: 0, underSkin: 0, next: null,
 };
 /** The number of jumps of the played recording when this was drawn. */
 let jumps = 0;
@@ -66,6 +66,7 @@ const receive = {
   },
   practice(message) {
     practice.goal(message);
+    tissue?.vein.follow(message.steps);
   },
   task(message) {
     events.add({ ...message, kind: "task" }, scene.layers);
@@ -125,6 +126,7 @@ function underSkin(body, { depth, angle, originX, originY }) {
 /** Nothing has happened yet: another scene, or another place in a recording. */
 function forget() {
   tissue = new Tissue(scene);
+  tissue.vein.follow(practice.steps);
   trace.clear();
   timePlot.clear();
   events.clear();
@@ -155,7 +157,7 @@ const practice = new Practice(link, palette);
 /** The values for tests and curious people: pictures per second, age of the last message, what is drawn, when first. */
 const stats = {
   fps: 0, frames: 0, lastMessageAgeMs: Infinity, depthMm: NaN, handMm: NaN, forceN: NaN, motorN: NaN, firstFrameMs: NaN,
-  drawn: section.drawn, vessel: "outside", flashback: false,
+  drawn: section.drawn, vessel: "outside", flashback: false, vein: null,
 };
 window.__stats = stats;
 const counting = { since: performance.now(), frames: 0 };
@@ -234,6 +236,7 @@ function count(nowMs) {
   stats.ghostMm = view.ghost;
   stats.vessel = tissue.place;
   stats.flashback = tissue.flashback;
+  stats.vein = tissue.vein;
   if (Number.isNaN(stats.firstFrameMs)) stats.firstFrameMs = performance.now();
 }
 

@@ -76,7 +76,7 @@ export function drawWish(g, colours, scale, needle, ahead) {
 }
 
 /** Draws the outline of another insertion's needle at this time, `ahead` mm in front of this one. */
-export function drawGhost(g, colours, scale, needle, ahead) {
+export function drawGhost(g, colours, scale, needle, ahead, name) {
   g.save();
   g.translate(ahead * scale, 0);
   g.globalAlpha = 0.6;
@@ -89,6 +89,11 @@ export function drawGhost(g, colours, scale, needle, ahead) {
   g.lineTo(0, 0);
   g.lineTo(-needle.length_mm * scale, 0);
   g.stroke();
+  g.fillStyle = colours.text;
+  g.font = `12px ${colours.font}`;
+  g.textAlign = "left";
+  g.textBaseline = "top";
+  g.fillText(name, -needle.length_mm * scale, (needle.hub_diameter_mm / 2) * scale);
   g.restore();
 }
 

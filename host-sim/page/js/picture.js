@@ -49,8 +49,9 @@ export class Picture {
     if (event.kind === "exit") this.core.tell(event.layer, 0);
   }
 
-  step(seconds, depth, angle) {
-    this.core.step(seconds, depth, angle);
+  /** Moves time on; `origin` is where the needle's line has depth 0, along the skin and below it. */
+  step(seconds, { depth, angle, origin }) {
+    this.core.step(seconds, depth, angle, origin[0], origin[1]);
   }
 
   // The memory moves when it grows: a pointer is asked for first, then the memory is looked at.

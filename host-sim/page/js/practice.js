@@ -2,7 +2,8 @@
 // recording and the learning curve. The server judges; see host-sim/training/src/verdict.rs.
 
 import { LearningCurve } from "./learning_curve.js";
-import { number, said, t } from "./language.js";
+import { language, number, said, t } from "./language.js";
+import { SessionSheet } from "./session_sheet.js";
 import { Tasks } from "./tasks.js";
 
 const byId = (id) => document.getElementById(id);
@@ -27,13 +28,16 @@ export class Practice {
     this.touchedAt = NaN;
     this.tasks = new Tasks(link);
     this.curve = new LearningCurve(byId("curve"), colours);
+    this.sheet = new SessionSheet((message) => link.send(message), () => ({ attempts: this.own(), goal: byId("goal").textContent, words: byId("curve").dataset.words ?? "", curve: byId("curve") }));
+    byId("debrief").search = `language=${language}`;
     this.record = byId("record");
     this.name = byId("record-name");
     this.record.addEventListener("click", () => this.askForRecording());
     byId("view-events").addEventListener("click", () => this.show(false));
     byId("view-practice").addEventListener("click", () => this.show(true));
-    /** The next step in words; empty where all are done. */
-    this.next = "";
+    /** The goal's steps, and the next of them; none where all are done. */
+    this.steps = [];
+    this.next = null;
     this.head();
   }
 
@@ -44,6 +48,7 @@ export class Practice {
 
   /** Goes to the practice or back to the events. */
   show(open) {
+    this.isShown = true;
     document.body.dataset.list = open ? "practice" : "events";
     byId("practice").hidden = !open;
     byId("events").hidden = open;
@@ -56,10 +61,23 @@ export class Practice {
     byId("list-views").hidden = false;
     byId("events-title").hidden = true;
     const isNew = this.patient !== patient || this.purpose !== purpose;
-    Object.assign(this, { patient, purpose, next: next === null ? "" : said(steps[next].words) });
+    Object.assign(this, { patient, purpose, steps, goalWords: goal, next: next === null ? null : steps[next] });
     write(byId("goal"), `${said(goal)}.`);
     this.tasks.follow(steps, next);
+    // A stranger finds what is to be done, step by step.
+    if (isNew && purpose === "cannulation" && !this.isShown) this.show(true);
     if (isNew) this.list();
+    if (isNew) this.drawCurve();
+  }
+
+  /** One for each goal: what was learnt in another procedure says little about this one. */
+  drawCurve() {
+    this.curve.draw(this.own());
+  }
+
+  /** A person's attempts at the present goal. */
+  own() {
+    return this.attempts.filter((one) => one.by_person && one.figures.verdict.goal === this.goalWords);
   }
 
   /** An insertion has ended. After a reconnection all are reported again. */
@@ -68,7 +86,7 @@ export class Practice {
     this.attempts.push(attempt);
     if (attempt.by_person) this.say(attempt);
     this.list();
-    this.curve.draw(this.attempts.filter((one) => one.by_person));
+    this.drawCurve();
   }
 
   say({ number: which, figures }) {
@@ -102,7 +120,8 @@ export class Practice {
       const { passed } = attempt.figures.verdict;
       cell(t(passed ? "practice.reached" : "practice.missed"), passed ? "good" : "bad");
       for (const [, key, digits] of COLUMNS) {
-        const isComparable = best && best !== attempt && best.patient === attempt.patient && key !== "in_lumen_s";
+        // A demonstration is no attempt to be better or worse.
+        const isComparable = attempt.by_person && best && best !== attempt && best.patient === attempt.patient && key !== "in_lumen_s";
         cell(...compared(attempt.figures[key], isComparable ? best.figures[key] : null, digits));
       }
       return row;
@@ -131,7 +150,8 @@ export class Practice {
   }
 
   /** Follows the server: the recording in progress, or null, and the file of the last one that was ended. */
-  follow({ recording, recorded }) {
+  follow({ recording, recorded, trainee }) {
+    if (this.patient !== null) this.sheet.follow({ trainee });
     const debrief = byId("debrief");
     if (debrief.hidden !== !recorded) debrief.hidden = !recorded;
     const text = t(recording ? "practice.end" : "practice.record");

@@ -5,7 +5,9 @@ import { surface } from "./canvas.js";
 import { drawInset } from "./inset.js";
 import { capital, number, t, tissueName } from "./language.js";
 import { WAITING_MM, drawForce, drawGhost, drawNeedle, drawWish, halfHub, wholeLength } from "./needle.js";
+import { NextStep } from "./next_step.js";
 import { displace } from "./tissue.js";
+import { middleOfVein } from "./vein.js";
 
 /** On a phone the names are short and the inset is small. */
 const NARROW = 560;
@@ -25,6 +27,7 @@ export class Section {
     this.small = small;
     this.surface = surface(canvas);
     this.colours = colours;
+    this.next = new NextStep();
     this.axis = { x: 1, y: 0, angle: NaN, fromX: 0, fromY: 0 };
     this.scale = NaN;
     this.origin = { x: 0, y: 0 };
@@ -49,6 +52,8 @@ export class Section {
     g.fillRect(0, 0, width, height);
     if (tissue.outlines) this.structures(g, tissue);
     else this.layers(g, tissue, width, height);
+    tissue.vein.move(view.seconds, this.axis, view.depth, tissue);
+    tissue.vein.drawBlood(g, this);
     this.vessel(g, tissue, width);
     this.beside(g, tissue);
     if (!this.small) this.ruler(g, tissue);
@@ -57,18 +62,8 @@ export class Section {
     this.names(g, tissue, width, height);
     this.scaleBar(g, width, height);
     if (tissue.vessel) this.inset(g, view, tissue, width);
-    this.next(g, view);
+    if (!this.small) this.next.draw(g, this, view, tissue);
     this.note(view, tissue);
-  }
-
-  /** The next step of the goal. */
-  next(g, view) {
-    if (!view.next || this.small) return;
-    g.font = `600 15px ${this.colours.font}`;
-    g.textAlign = "left";
-    g.textBaseline = "top";
-    g.fillStyle = this.colours.text;
-    g.fillText(t("section.next", { step: view.next }), 12, 12);
   }
 
   /** Sets the view: tip and hub are in it, and the layers do not move while the needle goes in. */
@@ -188,7 +183,8 @@ export class Section {
     for (const [number, { tissue: kind, points_mm: points }] of tissue.outlines.entries()) {
       g.beginPath();
       for (const [i, [x, y]] of points.entries()) {
-        displace(tissue, this.axis, x, y, this.point);
+        const middle = kind === "vessel" && tissue.vein.height < 1 ? (middleOfVein(tissue, x, y) ?? y) : y;
+        displace(tissue, this.axis, x, middle + tissue.vein.height * (y - middle), this.point);
         if (i === 0) g.moveTo(this.x(this.point.x), this.y(this.point.y));
         else g.lineTo(this.x(this.point.x), this.y(this.point.y));
       }
@@ -211,10 +207,11 @@ export class Section {
     const beside = tissue.place === "beside" || Math.abs(vessel.offset_mm) >= vessel.width_mm / 2;
     g.save();
     if (beside) g.globalAlpha = 0.35;
-    const far = vessel.far_mm;
+    const half = (tissue.vein.height * vessel.height_mm) / 2;
+    const [near, far] = [vessel.axis_mm - half, vessel.axis_mm + half];
     // Down to the near wall and back along the far one: one closed line.
     g.beginPath();
-    this.level(g, tissue, vessel.near_mm, width);
+    this.level(g, tissue, near, width);
     const left = -this.origin.x / this.scale - 3;
     const right = left + width / this.scale + 6;
     for (let i = COLUMNS; i >= 0; i--) {
@@ -224,7 +221,7 @@ export class Section {
     g.closePath();
     g.fillStyle = this.colours.lumen;
     g.fill();
-    for (const wall of [vessel.near_mm, far]) {
+    for (const wall of [near, far]) {
       g.beginPath();
       this.level(g, tissue, wall, width);
       g.strokeStyle = this.colours["vessel-edge"];
@@ -305,11 +302,16 @@ export class Section {
   }
 
   needle(g, view, tissue) {
+    if (tissue.vein.catheter) tissue.vein.drawCatheter(g, this, view.depth, tissue);
     g.save();
     this.alongNeedle(g, view.depth);
-    if (Number.isFinite(view.ghost)) drawGhost(g, this.colours, this.scale, tissue.needle, view.ghost - view.depth);
+    if (Number.isFinite(view.ghost)) drawGhost(g, this.colours, this.scale, tissue.needle, view.ghost - view.depth, t("section.ghost"));
     if (view.person) drawWish(g, this.colours, this.scale, tissue.needle, view.hand - view.depth);
     drawNeedle(g, this.colours, this.scale, tissue.needle, tissue);
+    g.restore();
+    if (!tissue.vein.catheter) tissue.vein.drawCatheter(g, this, view.depth, tissue);
+    g.save();
+    this.alongNeedle(g, view.depth);
     if (!this.small) drawForce(g, this.colours, this.scale, tissue.needle, view.motor);
     g.restore();
   }

@@ -1,6 +1,8 @@
 // What the needle does to the layers in the picture: which are touched, which have given way, how far each is dented, where the tip
 // is as seen from the vessel. Only a picture: the force comes from the device, and this follows its events and depths.
 
+import { Vein } from "./vein.js";
+
 /** The time in which tissue springs back after a puncture, s. */
 const RECOVERY_S = 0.12;
 /** The sideways reach of a dent, in mm. */
@@ -33,10 +35,12 @@ export class Tissue {
     this.place = "outside";
     /** Blood in the hub: it stays until the needle has left the skin. */
     this.flashback = false;
+    this.vein = new Vein();
   }
 
   /** Follows an event of the device. */
   happen(event) {
+    this.vein.happen(event, this);
     if (event.kind === "flashback") this.flashback = true;
     if (event.kind === "started" || event.layer === null) return;
     const layer = this.layers[event.layer];

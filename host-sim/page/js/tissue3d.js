@@ -124,7 +124,7 @@ export class Tissue3d {
     }
   }
 
-  /** One picture; `needle` is { depth, angle, flashback }, `probe` as ultrasound.js has it, or null. */
+  /** One picture; `needle` is { depth, angle, origin, flashback }, `probe` as ultrasound.js has it, or null. */
   draw(picture, needle, probe) {
     const { width, height } = this.fit();
     const { eye, target } = this.camera(needle, width / height);

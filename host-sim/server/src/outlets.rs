@@ -29,6 +29,8 @@ pub struct Outlets {
     recorded: Option<String>,
     /// Why there is no recording, where a person has asked for one in vain.
     complaint: Option<String>,
+    /// The name of the person at the device, as a page says it.
+    pub(crate) trainee: Option<String>,
     /// Tick after the newest sample.
     tick: u64,
 }
@@ -45,6 +47,7 @@ impl Outlets {
             hello: None,
             recorded: None,
             complaint: None,
+            trainee: None,
             tick: 0,
         }
     }
@@ -162,6 +165,7 @@ impl Outlets {
                 notice,
                 replay: None,
                 compensation: self.gains.share(),
+                trainee: self.trainee.clone(),
                 // Each subscription fills in its own.
                 skipped_samples: 0,
             };

@@ -6,7 +6,7 @@ use crate::saved_patients::SavedPatients;
 use control_core::{Device, Patient};
 use device_sim::error::Error;
 use device_sim::named_files::Text;
-use device_sim::procedure::Procedure;
+use device_sim::procedure::{self, Procedure};
 use device_sim::profile::{self, Profile};
 use device_sim::session::{PatientAnswer, PatientStatus, Scene, Source};
 use recording::messages::Setup;
@@ -52,7 +52,9 @@ impl PatientManager {
     pub fn choose(&mut self, name: &str) -> Result<Patient, Error> {
         let profile = Profile::parse_for(self.named(name)?, &self.device)?;
         // It brings its own procedure; the scripted hand must find its way in any.
-        let own = self.procedure.is_some().then(|| profile.procedure.clone());
+        let is_own = self.procedure.as_ref() == Some(&procedure::of_page(&self.profile));
+        let new = if is_own { procedure::of_page(&profile) } else { profile.procedure.clone() };
+        let own = self.procedure.is_some().then_some(new);
         self.ask(profile, own, None)
     }
 

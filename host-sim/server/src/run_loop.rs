@@ -14,6 +14,7 @@ use device_sim::lockstep;
 use device_sim::needle::LineSender;
 use device_sim::profile::Profile;
 use device_sim::session::{Control, PatientAnswer, Subscription};
+use link::frames::DeviceFrame;
 use recording::run_stats::RunStats;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -137,12 +138,10 @@ impl<'a> RunLoop<'a> {
                 self.control(control, |c| device.control(c));
             }
             self.start_once(now);
-            device.receive(self.driver.transmit(now));
-            for _ in 0..lockstep::TICKS {
-                device.tick();
-            }
-            lockstep::empty(|frame| device.transmit(frame), |bytes| self.receive(now, bytes));
-            self.follow_needle(now);
+            let Self { driver, outlets, needle, .. } = &mut self;
+            let see = |frame: &DeviceFrame| outlets.frame(frame);
+            lockstep::exchange(&mut device, driver, needle.as_mut(), |_| {}, see);
+            self.publish_needle();
             device.take_done().into_iter().for_each(|name| self.outlets.task(name.to_owned()));
             if let Some(taken) = self.patient_answer() {
                 let procedure = self.patients.as_ref().filter(|_| taken).and_then(PatientManager::procedure);
@@ -237,28 +236,20 @@ impl<'a> RunLoop<'a> {
             wire.write(out)?;
         }
         let count = wire.read(bytes, PATIENCE)?;
-        self.receive(begin.elapsed(), &bytes[..count]);
-        self.follow_needle(begin.elapsed());
-        Ok(())
-    }
-
-    /// Gives the frames in `bytes` to all that follow the device.
-    fn receive(&mut self, now: Duration, bytes: &[u8]) {
         let Self { driver, outlets, needle, .. } = self;
-        driver.receive(now, bytes, |frame| {
+        driver.receive(begin.elapsed(), &bytes[..count], |frame| {
             outlets.frame(frame);
             needle.iter_mut().for_each(|needle| needle.frame(frame));
         });
+        needle.iter_mut().for_each(|needle| driver.follow(begin.elapsed(), needle));
+        self.publish_needle();
+        Ok(())
     }
 
-    /// Tells the device and the pages where the needle's line is, where it has moved.
-    fn follow_needle(&mut self, now: Duration) {
-        let Some(needle) = &mut self.needle else { return };
-        self.outlets.publisher.needle(needle.track().origin_mm());
-        if self.driver.is_ready(now)
-            && let Some(line) = needle.due(now)
-        {
-            self.driver.line(line);
+    /// Tells the pages where the needle's line is.
+    fn publish_needle(&self) {
+        if let Some(needle) = &self.needle {
+            self.outlets.publisher.needle(needle.track().origin_mm());
         }
     }
 
@@ -321,6 +312,7 @@ impl<'a> RunLoop<'a> {
             Control::EndRecording => self.outlets.end_recording(&self.driver),
             Control::Probe(view) => self.outlets.probe(view),
             Control::Task { name } => self.task(name),
+            Control::Trainee { name } => self.outlets.trainee = Some(name).filter(|name| !name.is_empty()),
             Control::Start => self.driver.start(),
             Control::Stop => {
                 self.person_starts = true;

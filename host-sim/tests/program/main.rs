@@ -3,6 +3,7 @@
 
 mod acceptance;
 mod axes;
+mod bone;
 mod cannulation;
 mod characterise;
 #[cfg(all(unix, feature = "class"))]
@@ -29,6 +30,7 @@ mod papers_page;
 mod patients;
 mod plant;
 mod recordings;
+mod relaxation;
 mod safety_page;
 #[cfg(unix)]
 mod serial;

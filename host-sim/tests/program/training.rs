@@ -45,6 +45,31 @@ fn a_venepuncture_is_scored_and_debriefed() {
     refused(&run(&["debrief", "/no/such.mcap", "--out", text(&out)]), 2, &["/no/such.mcap"]);
 }
 
+/// But for names, no words of a debrief in another language are as in English.
+#[test]
+fn a_debrief_is_in_german_and_in_french() {
+    let (file, _) = scored("languages", &["--seconds", "12"]);
+    let words = |language: &str| {
+        let out = folder(&format!("debrief-{language}"));
+        run_well(&["debrief", text(&file), text(&file), "--language", language, "--out", text(&out)]);
+        let page = std::fs::read_to_string(out.join("debrief.html")).expect("written");
+        let (_, body) = page.split_once("</style>").expect("a style");
+        let texts = body.split('>').filter_map(|part| part.split_once('<')).map(|(text, _)| text.to_owned());
+        texts.filter(|text| text.chars().any(char::is_alphabetic)).collect::<Vec<_>>()
+    };
+    let english = words("en");
+    assert!(english.len() > 60, "{english:?}");
+    for (language, same) in [("de", &["5 mm"][..]), ("fr", &["5 mm", "Angle", "force, N"])] {
+        let others = words(language);
+        assert_eq!(others.len(), english.len(), "{language}");
+        for (ours, theirs) in english.iter().zip(&others) {
+            let is_name = ours.contains(".mcap") || same.contains(&ours.as_str());
+            assert!(ours != theirs || is_name, "{language}: {ours}");
+        }
+    }
+    refused(&run(&["debrief", text(&file), "--language", "pl", "--out", "x"]), 2, &["--language", "pl"]);
+}
+
 /// A needle driven through the far wall and off the patient's angle, compared with the scripted
 /// venepuncture.
 #[test]
@@ -81,7 +106,7 @@ fn a_score_is_written_as_xapi_statements() {
     for (statement, one) in statements.iter().zip(&insertions) {
         let mut keys: Vec<&String> = statement.as_object().expect("an object").keys().collect();
         keys.sort();
-        assert_eq!(keys, ["actor", "context", "object", "result", "timestamp", "verb", "version"]);
+        assert_eq!(keys, ["actor", "context", "id", "object", "result", "timestamp", "verb", "version"]);
         assert_eq!(statement["actor"]["mbox"], "mailto:trainee@example.org");
         let result = &statement["result"];
         assert_eq!((&result["success"], &result["completion"]), (&true.into(), &true.into()), "{statement}");
@@ -97,7 +122,10 @@ fn a_score_is_written_as_xapi_statements() {
         assert!(extensions.keys().all(|key| key.starts_with("urn:needle-insertion:")));
         assert_eq!(extensions["urn:needle-insertion:figure:peak_force_n"], one["peak_force_n"]);
     }
-    refused(&run(&["score", text(&file), "--xapi", "--actor", "nobody"]), 2, &["--actor", "nobody"]);
+    refused(&run(&["score", text(&file), "--xapi", "--actor", "nobody@"]), 2, &["--actor", "nobody@"]);
+    assert_ne!(statements[0]["id"], statements[1]["id"]);
+    let again: Value = serde_json::from_str(&run_well(&score)).expect("JSON");
+    assert_eq!(again[0]["id"], statements[0]["id"], "a store takes it once");
     refused(&run(&["score", text(&file), "--xapi"]), 2, &["--actor"]);
 }
 
@@ -225,6 +253,7 @@ fn patients_are_listed_with_their_layers() {
         "high-body-mass",
         "firm-skin",
         "dorsal-hand",
+        "child",
         "shoulder",
         "phantom",
         "shoulder-joint",

@@ -141,6 +141,18 @@ impl Goal {
 }
 
 impl Step {
+    /// Returns the range that it asks for, in the unit of its words; none where it asks for no
+    /// number.
+    pub fn range(self) -> Option<[f64; 2]> {
+        let range = match self {
+            Step::Angle => ENTRY_DEG,
+            Step::Lower => LOWERED_DEG,
+            Step::Advance => ADVANCED_MM,
+            _ => return None,
+        };
+        Some([*range.start(), *range.end()])
+    }
+
     /// Returns the name of the task that a person reports for it; none where the needle tells.
     pub fn task(self) -> Option<&'static str> {
         match self {

@@ -2,6 +2,7 @@
 
 pub mod debrief;
 pub mod goal;
+pub mod language;
 pub mod live_score;
 pub mod practice;
 pub mod score;

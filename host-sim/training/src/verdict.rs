@@ -29,6 +29,9 @@ pub struct StepResult {
     pub words: String,
     /// The name of the task that a person reports for it; none where the needle tells.
     pub task: Option<String>,
+    /// The range that it asks for, in the unit of its words; none where it asks for no number.
+    #[serde(default)]
+    pub range: Option<[f64; 2]>,
     /// Its state.
     pub state: StepState,
 }
@@ -123,7 +126,7 @@ pub(crate) fn judge(goal: &Goal, facts: &Facts<'_>) -> Verdict {
             }
         }
         let (words, task) = (goal.step_in_words(*step), step.task().map(str::to_owned));
-        steps.push(StepResult { step: *step, words, task, state });
+        steps.push(StepResult { step: *step, words, task, range: step.range(), state });
     }
     let passed = reasons.is_empty() && steps.iter().all(|step| step.state == StepState::Done);
     Verdict { goal: goal.in_words(), passed, steps, reasons }

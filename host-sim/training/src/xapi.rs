@@ -1,5 +1,6 @@
 //! Insertions as statements of the Experience API 1.0.3 (xAPI), which a learning record store takes
-//! as a JSON array. A statement has no `id`: the store adds one.
+//! as a JSON array. The id of a statement follows from what it says: a store takes an insertion
+//! once, however often it is sent.
 
 use crate::score::{Insertion, each};
 use control_core::TICK_HZ;
@@ -17,9 +18,9 @@ const SIMULATION: &str = "http://adlnet.gov/expapi/activities/simulation";
 const OURS: &str = "urn:needle-insertion:";
 
 /// Returns a statement for each insertion: passed or failed, how long it took, the figures of
-/// `score`, and the verdict. `e_mail` is the trainee's.
-pub fn statements(recording: &Recording, by: Option<&Profile>, e_mail: &str) -> Result<Vec<Value>, Error> {
-    let actor = actor(e_mail)?;
+/// `score`, and the verdict. `trainee` is an e-mail address or a pseudonym.
+pub fn statements(recording: &Recording, by: Option<&Profile>, trainee: &str) -> Result<Vec<Value>, Error> {
+    let actor = actor(trainee)?;
     let mut statements = Vec::new();
     each(recording, by, |span, judge, profile| {
         let mut statement = statement(&actor, profile, &judge.insertion(span));
@@ -27,6 +28,7 @@ pub fn statements(recording: &Recording, by: Option<&Profile>, e_mail: &str) -> 
         if let Some(stamp) = utc(since_s).filter(|_| recording.begun_ns > 0) {
             statement["timestamp"] = json!(stamp);
         }
+        statement["id"] = json!(id(&format!("{statement} {} {}", recording.begun_ns, span.begin)));
         statements.push(statement);
     })?;
     Ok(statements)
@@ -38,18 +40,31 @@ fn utc(since_1970_s: u64) -> Option<String> {
     Some(stamp.to_string())
 }
 
-/// The trainee, identified by an e-mail address.
-fn actor(e_mail: &str) -> Result<Value, Error> {
+/// Returns a UUID that follows from a text: FNV-1a of 128 bits, marked as version 8 of RFC 9562.
+fn id(text: &str) -> String {
+    let step = |hash: u128, byte: u8| (hash ^ u128::from(byte)).wrapping_mul(0x0100_0000_0000_0000_0000_013B);
+    let hash = text.bytes().fold(0x6C62_272E_07BB_0142_62B8_2175_6295_C58D, step);
+    let marked = hash & !(0xF << 76 | 0b11 << 62) | 0x8 << 76 | 0b10 << 62;
+    let digits = format!("{marked:032x}");
+    [&digits[..8], &digits[8..12], &digits[12..16], &digits[16..20], &digits[20..]].join("-")
+}
+
+/// The trainee: an e-mail address, or a pseudonym that says nothing outside this project.
+fn actor(trainee: &str) -> Result<Value, Error> {
     let is_plain = |part: &str| {
         !part.is_empty()
             && !part.contains(|c: char| c.is_whitespace() || c.is_control() || "@<>\"".contains(c))
     };
-    match e_mail.split_once('@') {
+    match trainee.split_once('@') {
         Some((name, domain)) if is_plain(name) && is_plain(domain) => {
-            Ok(json!({ "objectType": "Agent", "mbox": format!("mailto:{e_mail}") }))
+            Ok(json!({ "objectType": "Agent", "mbox": format!("mailto:{trainee}") }))
+        }
+        None if !trainee.trim().is_empty() && !trainee.contains(char::is_control) => {
+            let account = json!({ "homePage": format!("{OURS}pseudonyms"), "name": trainee });
+            Ok(json!({ "objectType": "Agent", "account": account }))
         }
         _ => Err(Error::input(format_args!(
-            "--actor is \"{e_mail}\"; it must be an e-mail address such as trainee@example.org"
+            "--actor is \"{trainee}\"; it must be an e-mail address such as trainee@example.org, or a pseudonym"
         ))),
     }
 }
@@ -119,6 +134,14 @@ mod tests {
         assert_eq!(failed["result"]["success"], false);
     }
 
+    /// RFC 9562: the digits of version and variant, and the published offset of FNV-1a.
+    #[test]
+    fn an_id_is_a_uuid_that_follows_from_the_text() {
+        assert_eq!(id(""), "6c62272e-07bb-8142-a2b8-21756295c58d");
+        assert_eq!(id("a"), id("a"));
+        assert_ne!(id("a"), id("b"));
+    }
+
     #[test]
     fn seconds_become_a_date() {
         // Written by `date -u -d @N +%FT%TZ`.
@@ -135,7 +158,8 @@ mod tests {
     #[test]
     fn names_and_addresses_are_checked() {
         assert_eq!(in_urn("Mrs. Müller 2"), "Mrs.%20M%C3%BCller%202");
-        for wrong in ["", "trainee", "@", "a@b@c", "a b@c.org", "a@"] {
+        assert_eq!(actor("blue 7").expect("a pseudonym")["account"]["name"], "blue 7");
+        for wrong in ["", " ", "a\n", "@", "a@b@c", "a b@c.org", "a@"] {
             let said = actor(wrong).expect_err(wrong).to_string();
             assert!(said.contains("--actor") && said.contains("trainee@example.org"), "{said}");
         }

@@ -50,11 +50,12 @@ pub struct Program {
 
 impl Program {
     /// A virtual device with its page at `port` (0: any free one), recorded where that is wanted.
+    /// The scripted hand does a venepuncture, 6 s a round.
     pub fn start(path: &Path, port: u16, record: Option<&Path>) -> Result<Self, Error> {
         let port = port.to_string();
         let record =
             record.map(|file| file.to_str().ok_or("the target folder has a plain name")).transpose()?;
-        let mut arguments = vec!["run", "--port", &port];
+        let mut arguments = vec!["run", "--port", &port, "--procedure", "venepuncture"];
         arguments.extend(record.into_iter().flat_map(|file| ["--record", file]));
         Self::start_with(path, &arguments)
     }

@@ -24,11 +24,11 @@
   if (!gpu) return { error: "this browser has no WebGPU" };
   const limbs = [new Tissue3d(first, colours(), new WebGl(first)), new Tissue3d(second, colours(), gpu)];
   for (const limb of limbs) limb.build(picture, scene);
-  for (let depth = 0; depth < 8; depth += 0.1) picture.step(1 / 60, depth, angle);
+  for (let depth = 0; depth < 8; depth += 0.1) picture.step(1 / 60, { depth, angle, origin: [0, 0] });
   const probe = { along: 8, across: 0, azimuth: 0, lean: 0, depth: 16 };
   const frame = () => new Promise(requestAnimationFrame);
   const drawn = async (limb, wait) => {
-    limb.draw(picture, { depth: 8, angle, flashback: true }, probe);
+    limb.draw(picture, { depth: 8, angle, origin: [0, 0], flashback: true }, probe);
     await wait();
     const { width, height } = limb.canvas;
     const file = await new Promise((resolve) => limb.canvas.toBlob(resolve));

@@ -10,8 +10,9 @@ use tests::browser::{Chromium, Error, Page, Places, Program, check};
 
 const LANGUAGES: [&str; 3] = ["en", "de", "fr"];
 /// The namespaces of keys that are put together by the page: `state.` and what the device says,
-/// `figure.` and the key of a patient, or `said.` and the name of a sentence.
-const PUT_TOGETHER: [&str; 6] = ["figure.", "state.", "tissue.", "task.", "said.", "unit."];
+/// `figure.` and the key of a patient, or `said.` and the name of a sentence; `debrief.` is read by
+/// the program.
+const PUT_TOGETHER: [&str; 7] = ["figure.", "state.", "tissue.", "task.", "said.", "unit.", "debrief."];
 
 fn page_folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../host-sim/page/js")

@@ -30,7 +30,8 @@ fn visit() -> Result<(), Error> {
         let _ = std::fs::remove_file(scratch.join(name));
     }
     let browser = Chromium::start(&scratch)?;
-    let program = Program::start_in(&places.program, &scratch, &["run", "--port", "0"])?;
+    let program =
+        Program::start_in(&places.program, &scratch, &["run", "--port", "0", "--procedure", "venepuncture"])?;
     let mut page = open(&browser, &program.url, SIZES[0])?;
     page.click("view-practice")?;
     page.wait(

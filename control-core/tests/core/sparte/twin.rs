@@ -20,6 +20,9 @@ pub(super) struct Twin {
     ticks: u32,
     is_busy: bool,
     has_stopped: bool,
+    is_turning: bool,
+    /// While it rests: the smallest stretch of the wall, and for how many ticks.
+    rest: Option<(f64, u32)>,
     /// Looks since the needle last went on in its direction; the furthest place; in 1, out −1, at
     /// rest 0.
     still: u32,
@@ -46,6 +49,8 @@ impl Twin {
             ticks: 1,
             is_busy: false,
             has_stopped: true,
+            is_turning: false,
+            rest: None,
             still: 0,
             furthest: 0.0,
             direction: 0.0,
@@ -63,7 +68,8 @@ impl Twin {
         } else if self.still == 2_500 / 16 {
             (self.direction, self.furthest) = (0.0, x);
         }
-        self.has_stopped = self.direction == 0.0 || self.still > 200 / 16 && off.abs() < 0.1;
+        self.is_turning = off.abs() >= 0.1;
+        self.has_stopped = self.direction == 0.0 || self.still > 200 / 16 && !self.is_turning;
     }
 
     pub(super) fn tick(&mut self, out: &TickOutput) -> f64 {
@@ -100,7 +106,7 @@ impl Twin {
             },
         );
         if self.given == 0 || x < self.tops[0] {
-            (self.wall, self.bristles) = (x, 0.0);
+            (self.wall, self.bristles, self.rest) = (x, 0.0, None);
             return elastic;
         }
         let innermost = self.tops[..self.touched].iter().rposition(|&top| x >= top).unwrap_or(0);
@@ -119,8 +125,14 @@ impl Twin {
         self.wall = self.wall.max(x - inwards).min(x + outwards);
         let held = self.sparte.friction.sliding.0.to_num::<f64>() / stiffness;
         let stretch = x - self.wall;
-        if self.has_stopped && stretch.abs() > held {
-            let share = -(-0.1 / f64::from(self.sparte.relax_ms)).exp_m1();
+        let (least, ticks) = self.rest.unwrap_or((f64::MAX, 0));
+        let least = least.min(stretch.abs());
+        let goes_on = self.is_turning || stretch.abs() > least + 0.15;
+        let rests = self.has_stopped || self.rest.is_some() && !goes_on;
+        self.rest = rests.then_some((least, ticks + 1));
+        if rests && stretch.abs() > held {
+            let pace = if (200..400).contains(&ticks) { 2.0 } else { 1.0 };
+            let share = -pace * (-0.1 / f64::from(self.sparte.relax_ms)).exp_m1();
             self.wall += (stretch - held * stretch.signum()) * share;
         }
         stiffness * (x - self.wall)

@@ -60,7 +60,9 @@ pub struct VirtualDevice {
     turned_rad: f64,
     /// The step of the procedure that is going on, as soon as it has begun.
     step: Option<usize>,
-    /// Tasks that the scripted hand has done and that have not been reported yet.
+    is_on_bone: bool,
+    /// Tasks that the scripted hand has done and that have not been reported yet, and "bone" where
+    /// the tip has met bone.
     done: Vec<&'static str>,
     set_value: f64,
     enable: bool,
@@ -110,6 +112,7 @@ impl VirtualDevice {
             zero_mm: 0.0,
             turned_rad: 0.0,
             step: None,
+            is_on_bone: false,
             done: Vec::new(),
             set_value: 0.0,
             enable: false,
@@ -207,6 +210,10 @@ impl VirtualDevice {
         self.powered_before = self.enable;
         let wanted = self.move_hand();
         self.plant.tick(self.set_value, self.enable, Some(wanted));
+        let was_on_bone = std::mem::replace(&mut self.is_on_bone, self.plant.is_on_bone());
+        if self.is_on_bone && !was_on_bone {
+            self.done.push("bone");
+        }
         self.tick += 1;
     }
 
@@ -235,6 +242,11 @@ impl VirtualDevice {
         if matches!(self.hand, Hand::Script { .. }) {
             self.restart_script();
         }
+    }
+
+    /// Bone stops the needle at `depth_mm` past its zero, or nothing does.
+    pub fn meet_bone(&mut self, depth_mm: Option<f64>) {
+        self.plant.set_bone(depth_mm.map(|mm| (mm + self.zero_mm) * 1e-3));
     }
 
     /// Moves the simulated hand or the device. What concerns the control law goes over the link and
@@ -326,7 +338,8 @@ impl VirtualDevice {
         }
     }
 
-    /// Returns the tasks that the scripted hand has done since the last time.
+    /// Returns the tasks that the scripted hand has done since the last time, and "bone" where the
+    /// tip has met bone.
     pub fn take_done(&mut self) -> Vec<&'static str> {
         std::mem::take(&mut self.done)
     }

@@ -5,9 +5,10 @@ use crate::profile::{InBody, Profile};
 /// The layers of a patient, as a line meets them.
 #[derive(Clone, Debug)]
 pub(super) enum Meeting {
-    /// Perpendicular to the skin, mm; the target ends to either side, if its patient says so: its
-    /// number, and from where to where along the skin, mm.
-    Level { depths_mm: Vec<f64>, ends: Option<(usize, (f64, f64))> },
+    /// Perpendicular to the skin, mm; of a vessel, the height at which the needle goes through it
+    /// beside its axis. The target ends to either side, if its patient says so: its number, and
+    /// from where to where along the skin, mm.
+    Level { depths_mm: Vec<f64>, bone_mm: Option<f64>, ends: Option<(usize, (f64, f64))> },
     /// The structures of a body.
     Body(Box<InBody>),
 }
@@ -17,15 +18,16 @@ impl Meeting {
         if let Some(body) = &profile.body {
             return Self::Body(Box::new(body.clone()));
         }
-        let layers = &profile.config.patient.layers;
+        let depths = profile.plan.own_line().depths;
         let ends = profile.goal().and_then(|goal| Some((usize::from(goal.layer), goal.reach_mm?)));
-        Self::Level { depths_mm: layers.iter().map(|layer| layer.depth.0.to_num()).collect(), ends }
+        let depths_mm = depths.iter().map(|depth| depth.0.to_num()).collect();
+        Self::Level { depths_mm, bone_mm: profile.bone_mm, ends }
     }
 
     /// Returns where a line from `origin_mm` meets each layer, mm along it.
     pub(super) fn tops_mm(&self, origin_mm: [f64; 2], angle_rad: f64) -> Vec<Option<f64>> {
         match self {
-            Self::Level { depths_mm, ends } => {
+            Self::Level { depths_mm, ends, .. } => {
                 let met = |(number, depth_mm): (usize, &f64)| {
                     let mm = (depth_mm - origin_mm[1]) / libm::sin(angle_rad);
                     let along_mm = origin_mm[0] + mm * libm::cos(angle_rad);
@@ -36,6 +38,17 @@ impl Meeting {
                 depths_mm.iter().enumerate().map(met).collect()
             }
             Self::Body(body) => body.tops_mm(origin_mm, angle_rad),
+        }
+    }
+
+    /// Returns where such a line meets bone, mm along it.
+    pub(super) fn bone_mm(&self, origin_mm: [f64; 2], angle_rad: f64) -> Option<f64> {
+        match self {
+            Self::Level { bone_mm, .. } => {
+                let mm = ((*bone_mm)? - origin_mm[1]) / libm::sin(angle_rad);
+                mm.is_finite().then_some(mm)
+            }
+            Self::Body(body) => body.bone_mm(origin_mm, angle_rad),
         }
     }
 }

@@ -38,6 +38,7 @@ pub struct NeedleTrack {
     depth_mm: f64,
     /// The depth at which its line meets each layer of the device, mm; none where it does not.
     tops_mm: Vec<Option<f64>>,
+    bone_mm: Option<f64>,
 }
 
 /// A point of the entry track that holds the needle.
@@ -61,6 +62,7 @@ impl NeedleTrack {
         let meeting = Meeting::new(profile);
         Self {
             tops_mm: meeting.tops_mm([0.0; 2], profile.entry_rad),
+            bone_mm: meeting.bone_mm([0.0; 2], profile.entry_rad),
             meeting,
             walls: profile.walls(),
             vessel: number(Tissue::Vessel),
@@ -90,6 +92,7 @@ impl NeedleTrack {
         self.origin_mm = along(pivot.place_mm, angle_rad, -pivot.at_mm);
         let below = if self.held.is_empty() { 0 } else { pivot.layer + 1 };
         let tops_mm = self.meeting.tops_mm(self.origin_mm, angle_rad);
+        self.bone_mm = self.meeting.bone_mm(self.origin_mm, angle_rad);
         for (top, new) in self.tops_mm.iter_mut().zip(tops_mm).skip(below) {
             *top = new.map(|mm| mm.max(pivot.at_mm));
         }
@@ -129,6 +132,12 @@ impl NeedleTrack {
     /// Returns the depth that was told last, mm.
     pub fn depth_mm(&self) -> f64 {
         self.depth_mm
+    }
+
+    /// Returns the depth at which bone stops the needle, mm along it; none where its line meets no
+    /// bone.
+    pub fn bone_mm(&self) -> Option<f64> {
+        self.bone_mm
     }
 
     /// True if the tip is in layer `number`: past its wall, if it has one.

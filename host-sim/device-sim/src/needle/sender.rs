@@ -26,6 +26,9 @@ pub struct LineSender {
     own: NeedleLine,
     sent: NeedleLine,
     sent_at: Duration,
+    /// A wall has given way since: a line, be it the same, tells the device that what the tip has
+    /// passed turns with the needle.
+    has_pierced: bool,
 }
 
 impl LineSender {
@@ -33,10 +36,11 @@ impl LineSender {
     pub fn new(profile: &Profile) -> Self {
         Self {
             track: NeedleTrack::new(profile),
-            sent: own(profile),
-            own: own(profile),
+            sent: profile.plan.own_line(),
+            own: profile.plan.own_line(),
             plan: profile.plan.clone(),
             sent_at: Duration::ZERO,
+            has_pierced: false,
         }
     }
 
@@ -51,6 +55,7 @@ impl LineSender {
                     // A zero before it has made the device forget the last line.
                     self.sent = self.own.clone();
                 }
+                self.has_pierced |= matches!(event.kind, EventKind::Puncture { .. });
                 self.track.happen(&event.kind);
             }
             DeviceFrame::Hello(_) => self.sent = self.own.clone(),
@@ -63,8 +68,8 @@ impl LineSender {
         &self.track
     }
 
-    /// Returns the line to send at `now`, if it has changed since the last one and that is long
-    /// enough ago.
+    /// Returns the line to send at `now`, if it has changed or a wall has given way since the last
+    /// one, and that is long enough ago.
     pub fn due(&mut self, now: Duration) -> Option<NeedleLine> {
         if now < self.sent_at + PERIOD {
             return None;
@@ -75,16 +80,12 @@ impl LineSender {
             .map(|(new, old)| (new.0.to_num::<f64>() - old.0.to_num::<f64>()).abs())
             .all(|mm| mm < SAME_MM);
         // One that the device would refuse is not sent: it stays with the last.
-        if is_same || self.plan.check_line(&line).is_err() {
+        if is_same && !self.has_pierced || self.plan.check_line(&line).is_err() {
             return None;
         }
-        (self.sent, self.sent_at) = (line.clone(), now);
+        (self.sent, self.sent_at, self.has_pierced) = (line.clone(), now, false);
         Some(line)
     }
-}
-
-fn own(profile: &Profile) -> NeedleLine {
-    NeedleLine { depths: profile.config.patient.layers.iter().map(|layer| layer.depth).collect() }
 }
 
 /// Returns the line of a needle: lengths along it times the sine of its angle. A layer without a

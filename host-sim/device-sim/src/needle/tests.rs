@@ -1,4 +1,5 @@
 use super::*;
+use crate::named_files::Text;
 
 fn track(patient: &str) -> NeedleTrack {
     NeedleTrack::new(&Profile::find(patient).expect("it is built in"))
@@ -60,4 +61,36 @@ fn a_target_that_ends_is_not_met_beside_it() {
     assert!(needle.tops_mm()[bursa].is_some());
     needle.move_to(-1.0, 37_f64.to_radians());
     assert_eq!(needle.tops_mm()[bursa], None);
+}
+
+/// The humerus is a ball of 23 mm about the origin: under 1.5 mm of cartilage, where the line comes
+/// to it.
+#[test]
+fn bone_lies_under_the_cartilage_of_a_joint() {
+    let needle = track("shoulder-joint");
+    let humerus = usize::from(number("shoulder-joint", "humerus"));
+    let cartilage_mm = needle.tops_mm()[humerus].expect("it is met");
+    assert!((needle.bone_mm().expect("there is bone") - cartilage_mm - 1.5).abs() < 1e-9);
+    assert_eq!(track("adult").bone_mm(), None);
+    let mut beside = track("shoulder-joint");
+    beside.move_to(-1.0, 5_f64.to_radians());
+    assert_eq!(beside.bone_mm(), None, "a flat needle passes over the joint");
+}
+
+/// The adult's vein is an ellipse of 3 mm from 4.8 mm on: 1 and 2 mm beside its axis, half its
+/// width of 4.46 mm, it is √(1 − (offset/2.23 mm)²) as high.
+#[test]
+fn a_vein_beside_the_needle_is_met_where_it_is_cut() {
+    for offset_mm in [1.0, -2.0_f64] {
+        let adult = include_str!("../../../profiles/adult.toml");
+        let text = adult.replace("offset_mm = 0.0", &format!("offset_mm = {offset_mm:.1}"));
+        let profile = Profile::parse(Text { origin: "beside.toml".into(), text }).expect("it is a patient");
+        let half_mm = 1.5 * (1.0 - (offset_mm / 2.23).powi(2)).sqrt();
+        let mut needle = NeedleTrack::new(&profile);
+        needle.move_to(-1.0, 45_f64.to_radians());
+        for (layer, depth_mm) in [(2, 6.3 - half_mm), (3, 6.3 + half_mm)] {
+            let met_mm = needle.tops_mm()[layer].expect("it is met") * 45_f64.to_radians().sin();
+            assert!((met_mm - depth_mm).abs() < 2e-3, "{offset_mm} mm beside: {met_mm}, not {depth_mm} mm");
+        }
+    }
 }

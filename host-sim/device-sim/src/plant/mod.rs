@@ -15,6 +15,9 @@ use bearing::{Bearing, BearingStep};
 use hand::{Grip, Hand};
 use motor::{Amplifier, Motor};
 
+/// Stiffness and damping of bone under the tip, N/m and N·s/m: a needle that is pushed by 10 N goes
+/// 0.05 mm into it. Assumptions; nobody has measured what a needle on bone does.
+const BONE: (f64, f64) = (2.0e5, 30.0);
 /// Physics steps in a tick of the control law.
 pub const STEPS_PER_TICK: u32 = 10;
 /// One physics step in s.
@@ -94,6 +97,8 @@ pub struct Plant {
     most_shear: f64,
     hand: Hand,
     hand_force: f64,
+    /// The place at which bone stops the tip, m past the skin.
+    bone: Option<f64>,
 }
 
 impl Plant {
@@ -114,6 +119,7 @@ impl Plant {
             most_shear: config.grip_force / config.coat_stiffness,
             hand: Hand::new(grip, tip),
             hand_force: 0.0,
+            bone: None,
             config,
         }
     }
@@ -122,6 +128,22 @@ impl Plant {
     pub fn set_tilt(&mut self, tilt: f64) {
         self.tilt = tilt;
         self.weight = self.config.needle_mass * GRAVITY * libm::sin(tilt);
+    }
+
+    /// Puts bone at `place` m past the skin, or takes it away.
+    pub fn set_bone(&mut self, place: Option<f64>) {
+        self.bone = place;
+    }
+
+    /// True if the tip presses on bone.
+    pub fn is_on_bone(&self) -> bool {
+        self.bone.is_some_and(|place| self.tip > place)
+    }
+
+    /// Force of bone on the tip, against insertion, N.
+    fn bone_force(&self) -> f64 {
+        let Some(place) = self.bone.filter(|place| self.tip > *place) else { return 0.0 };
+        (BONE.0 * (self.tip - place) + BONE.1 * self.tip_speed).max(0.0)
     }
 
     /// Inclination below the horizontal, rad.
@@ -154,7 +176,9 @@ impl Plant {
             (c.coat_stiffness * self.shear + c.coat_damping * slide).clamp(-c.grip_force, c.grip_force);
         let torque = self.amplifier.step(&c.motor, wanted_current, self.speed);
 
-        self.tip_speed = settled(self.tip_speed + self.per_force * (self.hand_force + self.weight - grip));
+        self.tip_speed = settled(
+            self.tip_speed + self.per_force * (self.hand_force + self.weight - grip - self.bone_force()),
+        );
         self.speed = self.bearing.step(self.speed, torque + grip * c.roller_radius);
         self.tip += STEP_S * self.tip_speed;
         self.angle += STEP_S * self.speed;

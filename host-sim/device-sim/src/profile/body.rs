@@ -13,6 +13,8 @@ const THINNEST_MM: f64 = 0.2;
 /// The length of the needle's line that is asked for layers, mm: within the device's travel, a
 /// wall's puncture included.
 const REACH_MM: f64 = 55.0;
+/// Cartilage over the bone of a joint, mm: an assumption, 1 to 2 mm where it bears load.
+const OVER_BONE_MM: f64 = 1.5;
 /// Thickness that fat may have, mm.
 const FAT_MM: [f64; 2] = [1.0, 60.0];
 
@@ -191,10 +193,7 @@ impl InBody {
     /// it; none for a layer that it does not meet. The line begins at `origin_mm` in the needle's
     /// plane, along it and below the point of entry, and is inclined by `incline_rad`.
     pub(crate) fn tops_mm(&self, origin_mm: [f64; 2], incline_rad: f64) -> Vec<Option<f64>> {
-        let block = &self.line.block;
-        let origin = block.to_limb([origin_mm[0], 0.0, origin_mm[1]]);
-        let direction = block.direction_to_limb([libm::cos(incline_rad), 0.0, libm::sin(incline_rad)]);
-        let pieces = self.body.met(origin, direction, REACH_MM);
+        let pieces = self.pieces_along(origin_mm, incline_rad);
         let met = self.met_along(&pieces, true);
         let mut from = 0;
         let top = |name: &String| {
@@ -203,6 +202,23 @@ impl InBody {
             Some(met[found].2)
         };
         self.names.iter().map(top).collect()
+    }
+
+    /// Returns where such a line meets bone, under its cartilage, mm along it; none if it does not.
+    pub(crate) fn bone_mm(&self, origin_mm: [f64; 2], incline_rad: f64) -> Option<f64> {
+        let pieces = self.pieces_along(origin_mm, incline_rad);
+        let is_joint = |piece: &&Piece| {
+            let tissue = self.body.structures[piece.structure].tissue;
+            tissue == Tissue::Cartilage && piece.to_mm - piece.from_mm > 2.0 * OVER_BONE_MM
+        };
+        pieces.iter().find(is_joint).map(|piece| piece.from_mm + OVER_BONE_MM)
+    }
+
+    fn pieces_along(&self, origin_mm: [f64; 2], incline_rad: f64) -> Vec<Piece> {
+        let block = &self.line.block;
+        let origin = block.to_limb([origin_mm[0], 0.0, origin_mm[1]]);
+        let direction = block.direction_to_limb([libm::cos(incline_rad), 0.0, libm::sin(incline_rad)]);
+        self.body.met(origin, direction, REACH_MM)
     }
 
     /// Returns the body for a picture.
@@ -245,6 +261,9 @@ impl File {
             return Err(format!(
                 "depth_mm of the {word} is given, and [body] says where it is; remove depth_mm"
             ));
+        }
+        if self.layer.iter().any(|layer| layer.over_bone_mm.is_some()) {
+            return Err("over_bone_mm is given, and [body] says where bone is; remove over_bone_mm".into());
         }
         let by_person = self.layer.iter().find_map(|layer| layer.thickness);
         let fat_mm = by_person.map(|rule| rule.of_mm(&self.patient)).transpose()?;

@@ -4,6 +4,7 @@
 
 mod beside;
 mod body;
+mod bone;
 mod condition;
 mod entry;
 mod goal;
@@ -32,13 +33,17 @@ use person::Thickness;
 pub use person::{Difficulty, Person, Sex, Site};
 pub(crate) use tissues::TissueName;
 
+/// The procedure of a patient whose file names none.
+pub(crate) const USUAL_PROCEDURE: &str = "venepuncture";
+
 /// The profiles that come with the program.
-pub const BUILT_IN: [(&str, &str); 11] = [
+pub const BUILT_IN: [(&str, &str); 12] = [
     ("adult", include_str!("../../../profiles/adult.toml")),
     ("thin-elderly", include_str!("../../../profiles/thin-elderly.toml")),
     ("high-body-mass", include_str!("../../../profiles/high-body-mass.toml")),
     ("firm-skin", include_str!("../../../profiles/firm-skin.toml")),
     ("dorsal-hand", include_str!("../../../profiles/dorsal-hand.toml")),
+    ("child", include_str!("../../../profiles/child.toml")),
     ("shoulder", include_str!("../../../profiles/shoulder.toml")),
     ("phantom", include_str!("../../../profiles/phantom.toml")),
     ("shoulder-joint", include_str!("../../../profiles/shoulder-joint.toml")),
@@ -66,6 +71,8 @@ pub struct Profile {
     pub spared: Vec<u8>,
     /// Structures next to the needle's way that it is to spare.
     pub beside: Vec<Beside>,
+    /// Bone under level layers, perpendicular to the skin, mm.
+    pub(crate) bone_mm: Option<f64>,
     /// The body that its layers come from, if it has one.
     pub body: Option<InBody>,
     /// The needle's target.
@@ -108,6 +115,7 @@ impl Profile {
         let has_vein = file.layer.iter().any(is_vein);
         let body = file.take_body().map_err(refuse)?;
         let config = Config { device: *device, patient: file.config().map_err(refuse)? };
+        let bone_mm = file.bone_mm(&config.patient).map_err(refuse)?;
         let plan = config.plan().map_err(|refusal| refuse(refusal::say(&refusal, &file)))?;
         let spared =
             (0_u8..).zip(&file.layer).filter(|(_, layer)| layer.is_spared()).map(|(number, _)| number);
@@ -116,8 +124,9 @@ impl Profile {
             goal: file.target,
             has_vein,
             beside: file.beside,
+            bone_mm,
             body,
-            procedure: file.procedure.unwrap_or_else(|| "venepuncture".into()),
+            procedure: file.procedure.unwrap_or_else(|| USUAL_PROCEDURE.into()),
             person: file.patient,
             name: file.name,
             entry_rad: file.entry_deg.to_radians(),
@@ -292,6 +301,8 @@ struct Layer {
     depth_mm: Option<f64>,
     /// The rule for its thickness; the layers below move with it.
     thickness: Option<Thickness>,
+    /// Bone lies under it, this far below its top, mm; in a body it follows from the line.
+    over_bone_mm: Option<f64>,
     wall: Option<Wall>,
     /// For the jog law.
     friction_n_per_mm: Option<f64>,

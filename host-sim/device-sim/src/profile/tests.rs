@@ -121,6 +121,11 @@ fn each_law_has_a_patient_whose_file_says_what_is_its_own() {
         (format!("{shoulder}friction_n_per_mm = 0.02\n"), "friction_n_per_mm is the law jog's"),
         (shoulder.replace("sex = \"male\"\n", ""), "thickness by-body-mass needs patient.sex"),
         (shoulder.replace("thickness", "thick"), "thick"),
+        (
+            shoulder.replace("over_bone_mm = 3.0", "over_bone_mm = nan"),
+            "over_bone_mm of the cartilage is NaN",
+        ),
+        (shoulder.replace("depth_mm = 8.0", "depth_mm = 8.0\nover_bone_mm = 3.0"), "under the muscle"),
         (format!("{shoulder}thickness = \"by-body-mass\"\n"), "none below it"),
         (phantom.replace("[force_table]", "[forces]"), "forces"),
         (phantom.replace("speeds_mm_s = [1.0, 3.0, 5.0]", "speeds_mm_s = [1.0, 3.0]"), "need 6 rows"),

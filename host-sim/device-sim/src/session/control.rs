@@ -72,6 +72,11 @@ pub enum Control {
         /// Its name: 1 to 40 lower-case letters, digits or `_`.
         name: String,
     },
+    /// The person at the device has this name or pseudonym, which the device's class is told.
+    Trainee {
+        /// The name, at most 60 characters on a line; none where it is empty.
+        name: String,
+    },
     /// A recording is to go on from here.
     Seek {
         /// Time into the recording in s, 0 or more.
@@ -124,6 +129,9 @@ impl Control {
             Self::Task { name } if !is_task_name(&name) => Err(
                 "a task's name has 1 to 40 lower-case letters, digits or _; use a name of the procedure's file".into(),
             ),
+            Self::Trainee { name } if name.chars().count() > 60 || name.contains(char::is_control) => {
+                Err("a trainee's name has at most 60 characters on one line".into())
+            }
             Self::Seek { at_s } if !(0.0..=1e9).contains(&at_s) => {
                 Err(format!("time {at_s} s is not within 0 to 1e9 s"))
             }
@@ -150,6 +158,8 @@ mod tests {
             r#"{"do":"tilt","rad":2}"#,
             r#"{"do":"task","name":""}"#,
             r#"{"do":"task","name":"<b>"}"#,
+            r#"{"do":"trainee","name":"a\nb"}"#,
+            r#"{"do":"trainee"}"#,
             r#"{"do":"seek","at_s":-1}"#,
             r#"{"do":"record","name":"../monday"}"#,
             r#"{"do":"record","name":""}"#,

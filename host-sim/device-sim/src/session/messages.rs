@@ -83,6 +83,8 @@ pub struct LinkStatus {
     pub replay: Option<ReplayStatus>,
     /// The share of the device's compensation in force, 0 to 1; none where it compensates nothing.
     pub compensation: Option<f64>,
+    /// The name or pseudonym of the person at the device, where one has been given.
+    pub trainee: Option<String>,
     /// The number of samples that were skipped because this receiver was too slow; they are still
     /// in the recording.
     pub skipped_samples: u64,

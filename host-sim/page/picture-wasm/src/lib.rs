@@ -71,9 +71,10 @@ pub extern "C" fn tell(layer: u32, given: u32) {
 }
 
 /// Moves time on by `seconds`; the tip is `depth_mm` along the needle, `angle` rad below the skin.
+/// The needle's line has depth 0 at `ahead_mm` along the skin and `down_mm` below it.
 #[cfg_attr(target_arch = "wasm32", unsafe(no_mangle))]
-pub extern "C" fn step(seconds: f32, depth_mm: f32, angle: f32) {
-    with(|picture| picture.step(seconds, depth_mm, angle));
+pub extern "C" fn step(seconds: f32, depth_mm: f32, angle: f32, ahead_mm: f32, down_mm: f32) {
+    with(|picture| picture.step(seconds, depth_mm, angle, [ahead_mm, down_mm]));
 }
 
 /// 0 away, 1 touching, 2 inserted: the wall of a layer by its number in the scene.

@@ -159,9 +159,13 @@ impl Picture {
         }
     }
 
-    /// Moves time on with the tip `depth_mm` along a needle at `angle` rad to the skin.
-    pub fn step(&mut self, seconds: f32, depth_mm: f32, angle: f32) {
-        let needle = Needle::entering(depth_mm, angle, 0.0);
+    /// Moves time on with the tip `depth_mm` along a needle at `angle` rad to the skin, whose line
+    /// has depth 0 at `origin_mm` along the skin and below it: one that has turned in tissue turns
+    /// about the point that holds it and not about its entry.
+    pub fn step(&mut self, seconds: f32, depth_mm: f32, angle: f32, origin_mm: [f32; 2]) {
+        let mut needle = Needle::entering(depth_mm, angle, 0.0);
+        needle.tip[0] += origin_mm[0];
+        needle.tip[2] += origin_mm[1];
         self.tissue.step(&needle, seconds);
         let moved = self.tissue.points();
         self.points[..moved.len()].copy_from_slice(moved);

@@ -65,12 +65,12 @@ mod tests {
         let limb = Picture::new(&phantom(0.0)).expect("it can be built");
         assert!(count(&limb, Kind::VesselBehind) == 1 && limb.points().len() != picture.points().len());
         for step in 0..=120 {
-            picture.step(1.0 / 60.0, -2.0 + 4.0 * step as f32 / 120.0, 1.05);
+            picture.step(1.0 / 60.0, -2.0 + 4.0 * step as f32 / 120.0, 1.05, [0.0; 2]);
         }
         assert_eq!(picture.wall_state(0), PunctureState::Touching);
         picture.tell(0, PunctureState::Inserted);
         for step in 0..=120 {
-            picture.step(1.0 / 60.0, 2.0 + 4.0 * step as f32 / 120.0, 1.05);
+            picture.step(1.0 / 60.0, 2.0 + 4.0 * step as f32 / 120.0, 1.05, [0.0; 2]);
         }
         assert_eq!(picture.wall_state(0), PunctureState::Inserted);
         assert!(picture.points().iter().flatten().all(|number| number.abs() < 100.0), "it holds together");

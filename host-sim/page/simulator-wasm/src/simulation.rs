@@ -67,27 +67,15 @@ impl Simulation {
             if may_start && !self.driver.has_started() && !self.driver.is_starting() {
                 self.driver.start();
             }
-            self.device.receive(self.driver.transmit(now));
-            for _ in 0..lockstep::TICKS {
-                self.device.tick();
-            }
             let Self { device, driver, publisher, digest, needle, .. } = self;
-            lockstep::empty(
-                |frame| device.transmit(frame),
-                |bytes| {
-                    digest.take(bytes);
-                    driver.receive(now, bytes, |frame| {
-                        publisher.frame(frame);
-                        needle.frame(frame);
-                    });
-                },
+            lockstep::exchange(
+                device,
+                driver,
+                Some(needle),
+                |bytes| digest.take(bytes),
+                |frame| publisher.frame(frame),
             );
             publisher.needle(needle.track().origin_mm());
-            if driver.is_ready(now)
-                && let Some(line) = needle.due(now)
-            {
-                driver.line(line);
-            }
         }
         self.status();
     }

@@ -63,6 +63,7 @@ struct About {
     scene: Value,
     connected: bool,
     recording: bool,
+    trainee: Option<String>,
     fault: Option<String>,
     still_s: f64,
     score: ClassScore,
@@ -82,6 +83,8 @@ pub struct MemberView {
     pub connected: bool,
     /// True if it records.
     pub recording: bool,
+    /// The name or pseudonym of its trainee, where one has been given.
+    pub trainee: Option<String>,
     /// The reason why its trainee seems to need help, in words.
     pub stuck: Option<String>,
     /// The newest pose, a [`crate::streams::NeedlePose`].
@@ -218,6 +221,7 @@ impl Member {
             silent_s: silent.as_secs_f64(),
             connected: self.about.as_ref().is_some_and(|about| about.connected),
             recording: self.about.as_ref().is_some_and(|about| about.recording),
+            trainee: self.about.as_ref().and_then(|about| about.trainee.clone()),
             stuck: self.about.as_ref().and_then(About::stuck),
             pose: newest.map(|told| told.newest),
             poses: self.heard_poses,
@@ -249,7 +253,7 @@ mod tests {
 
     fn about(score: &ClassScore, still_s: f64, fault: Option<&str>) -> Vec<u8> {
         let about = json!({ "scene": { "layers": [], "profile": "adult" }, "connected": true, "recording": true,
-            "fault": fault, "still_s": still_s, "score": score, "events": [] });
+            "trainee": "Ann", "fault": fault, "still_s": still_s, "score": score, "events": [] });
         serde_json::to_vec(&about).unwrap()
     }
 
@@ -267,7 +271,8 @@ mod tests {
         let seen = view(&board, after(5_000));
         assert!(seen.gone && (seen.silent_s - 5.0).abs() < 1e-9);
         assert!(board.hear("bed-1", "about", &about(&ClassScore::default(), 0.0, None), after(6_000)));
-        assert!(!view(&board, after(6_100)).gone);
+        let seen = view(&board, after(6_100));
+        assert_eq!((seen.gone, seen.trainee.as_deref()), (false, Some("Ann")));
     }
 
     #[test]

@@ -93,6 +93,8 @@ pub struct About {
     pub connected: bool,
     /// True if it records.
     pub recording: bool,
+    /// The trainee's name or pseudonym, where one has been given.
+    pub trainee: Option<String>,
     /// The fault that has latched, in words.
     pub fault: Option<String>,
     /// The time for which the tip has been in the body and within 1 mm of one place, s; 0 outside.

@@ -76,6 +76,7 @@ impl ClassPublisher {
                 scene: scene.clone(),
                 connected: status.connected,
                 recording: status.recording.is_some(),
+                trainee: status.trainee.clone(),
                 fault: self.fault.clone(),
                 still_s: self.stillness.seconds(),
                 score: self.score.clone(),

@@ -28,6 +28,8 @@ pub struct Snapshot {
     pub scene: Option<SharedScene>,
     /// The ultrasound probe as a page holds it; none before it has.
     pub probe: Option<ProbeView>,
+    /// The place at which the needle's line has depth 0, mm along the skin and below it.
+    pub needle_mm: [f64; 2],
 }
 
 /// A scene that equals itself and no other: it is compared with each pose.
@@ -137,6 +139,7 @@ pub(super) async fn run(mut subscription: Subscription, publish: watch::Sender<S
             snapshot.connected = connected;
             snapshot.scene = scene.or_else(|| snapshot.scene.take());
             snapshot.probe = probe.or(snapshot.probe);
+            snapshot.needle_mm = frame.needle.unwrap_or(snapshot.needle_mm);
             if let Some(fault) = faults {
                 snapshot.fault = fault;
             }

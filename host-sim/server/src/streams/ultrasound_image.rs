@@ -122,7 +122,8 @@ impl Imager {
         let seconds = PERIOD.as_secs_f32();
         let steps = (seconds / LONGEST_STEP_S).ceil();
         for _ in 0..steps as usize {
-            picture.step(seconds / steps, pose.depth_mm as f32, pose.angle_rad as f32);
+            let origin_mm = snapshot.needle_mm.map(|mm| mm as f32);
+            picture.step(seconds / steps, pose.depth_mm as f32, pose.angle_rad as f32, origin_mm);
         }
         let view = snapshot.probe.unwrap_or(PROBE);
         let [along, across, azimuth, lean] =

@@ -1,8 +1,8 @@
-//! The debrief of the last recording at `/debrief`. It is made of the file in a thread of its own,
-//! because a long recording takes seconds.
+//! The debrief of the last recording at `/debrief`, in a language at `/debrief?language=de`. It is
+//! made of the file in a thread of its own, because a long recording takes seconds.
 
 use axum::Router;
-use axum::extract::State;
+use axum::extract::{RawQuery, State};
 use axum::http::{StatusCode, header};
 use axum::response::{Html, IntoResponse, Response};
 use axum::routing::get;
@@ -11,22 +11,23 @@ use device_sim::session::Session;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Makes the page of a recording's file.
-pub type Debrief = Arc<dyn Fn(&Path) -> Result<String, Error> + Send + Sync>;
+/// Makes the page of a recording's file, in the language of a tag if there is one.
+pub type Debrief = Arc<dyn Fn(&Path, Option<&str>) -> Result<String, Error> + Send + Sync>;
 
 /// Serves what `write` makes of the file that the session names as recorded last.
 pub(super) fn router(session: Session, write: Debrief) -> Router {
     Router::new().route("/debrief", get(page).with_state((session, write)))
 }
 
-async fn page(State((session, write)): State<(Session, Debrief)>) -> Response {
+async fn page(State((session, write)): State<(Session, Debrief)>, RawQuery(asked): RawQuery) -> Response {
     let Some(file) = session.subscribe().drain().link.recorded else {
         let what = "nothing has been recorded in the page yet; record an insertion first";
         return (StatusCode::NOT_FOUND, what).into_response();
     };
     // A debrief has its style and its figures in itself.
     let policy = "default-src 'none'; style-src 'unsafe-inline'; img-src data:";
-    report(move || write(Path::new(&file)), policy).await
+    let language = move || asked.as_deref()?.strip_prefix("language=").map(str::to_owned);
+    report(move || write(Path::new(&file), language().as_deref()), policy).await
 }
 
 /// Makes a page, which may take seconds, and serves it under a policy of its contents.

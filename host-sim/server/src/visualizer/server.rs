@@ -276,7 +276,7 @@ mod tests {
         // Without a network there is nobody to keep out.
         let Some(own) = own_address().filter(|address| !address.is_loopback()) else { return };
         let (session, _publisher) = device_sim::session::open(super::super::test_scene());
-        let write: Debrief = Arc::new(|_| Ok(String::new()));
+        let write: Debrief = Arc::new(|_, _| Ok(String::new()));
         let all = (Ipv4Addr::UNSPECIFIED, 0).into();
         let server = serve_with_reports(session, all, write, || Ok(String::new())).unwrap();
         let from_outside = SocketAddr::from((own, server.port()));
@@ -311,7 +311,7 @@ mod tests {
     #[test]
     fn an_address_of_another_computer_is_one_clear_line() {
         let (session, _publisher) = device_sim::session::open(super::super::test_scene());
-        let write: Debrief = Arc::new(|_| Ok(String::new()));
+        let write: Debrief = Arc::new(|_, _| Ok(String::new()));
         let error = serve_with_reports(session, "192.0.2.7:0".parse().unwrap(), write, || Ok(String::new()))
             .unwrap_err();
         assert!(matches!(error, ServeError::NoSuchAddress { .. }), "{error}");

@@ -78,8 +78,8 @@ fn attempt(
     }
 }
 
-/// The page; none of no attempt. The first and the last are compared, or an expert's best and the
-/// last, over the anatomy of the last one's patient.
+/// The page in English; none of no attempt. The first and the last are compared, or an expert's
+/// best and the last, over the anatomy of the last one's patient.
 pub fn html(attempts: &[Attempt], expert: &[Attempt]) -> Option<String> {
     let patient = &attempts.last()?.patient;
     let scene = patient.scene(Source::Virtual, None);
@@ -103,8 +103,8 @@ pub fn html(attempts: &[Attempt], expert: &[Attempt]) -> Option<String> {
     );
     let mut sheet = Sheet::new("Debrief", &lead);
     for one in &compared {
-        let words = in_words(&one.figures);
-        sheet.paragraph(&format!("{}: {}. {}", one.name, one.figures.verdict.goal, words.join(" ")));
+        sheet.paragraph(&format!("{}: {}.", one.name, one.figures.verdict.goal));
+        in_words(&one.figures).iter().for_each(|words| sheet.paragraph(words));
     }
     sheet.heading("The gesture and what was felt");
     sheet.figures(&pictures(&compared, &scene));

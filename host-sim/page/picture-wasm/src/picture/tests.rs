@@ -31,7 +31,7 @@ fn the_picture_follows_the_devices_punctures_and_needle() {
     let mut picture = Picture::new(&ADULT).expect("it can be built");
     let drive = |picture: &mut Picture, from: f32, to: f32| {
         for step in 0..=60 {
-            picture.step(1.0 / 60.0, from + (to - from) * step as f32 / 60.0, 0.52);
+            picture.step(1.0 / 60.0, from + (to - from) * step as f32 / 60.0, 0.52, [0.0; 2]);
         }
     };
     drive(&mut picture, -2.0, 3.5);
@@ -70,7 +70,7 @@ fn numbers_that_are_not_finite_are_refused_or_drawn() {
             let mut numbers = ADULT;
             numbers[slot] = wrong;
             if let Ok(mut picture) = Picture::new(&numbers) {
-                picture.step(0.016, 1.0, 0.5);
+                picture.step(0.016, 1.0, 0.5, [0.0; 2]);
                 assert!(picture.points().iter().flatten().all(|number| number.is_finite()), "slot {slot}");
             }
         }
@@ -109,7 +109,7 @@ fn a_body_is_drawn_cut_and_imaged() {
     assert_eq!(tissues(Kind::Section), [0, 1, 2, 4, 5, 6]);
     assert_eq!(tissues(Kind::InsideBehind), [4, 5, 6]);
     for step in 0..120 {
-        picture.step(1.0 / 60.0, -2.0 + step as f32 * 0.05, 0.785);
+        picture.step(1.0 / 60.0, -2.0 + step as f32 * 0.05, 0.785, [0.0; 2]);
     }
     assert!(picture.points().iter().flatten().all(|number| number.abs() < 400.0), "it holds together");
     // Bone reflects: straight down from over the humerus the image is bright at its depth, and dark
@@ -149,7 +149,20 @@ fn a_vein_on_the_line_gives_way_at_the_devices_word() {
     assert!(cut.iter().any(|high| (*high - 3.0).abs() < 0.6), "{cut:?}");
     picture.tell(0, PunctureState::Inserted);
     for step in 0..200 {
-        picture.step(1.0 / 60.0, -2.0 + step as f32 * 0.035, 1.48);
+        picture.step(1.0 / 60.0, -2.0 + step as f32 * 0.035, 1.48, [0.0; 2]);
     }
     assert_ne!(picture.wall_state(2), PunctureState::Away);
+}
+
+/// Lowered by 10° about a point 11 mm along it: that point stays, worked by hand.
+#[test]
+fn a_needle_turns_about_the_point_that_holds_it() {
+    let mut picture = Picture::new(&ADULT).expect("it can be built");
+    let [steep, flat] = [25_f32, 15.0].map(f32::to_radians);
+    let along = |angle: f32| [11.0 * angle.cos(), 11.0 * angle.sin()];
+    let origin_mm = [along(steep)[0] - along(flat)[0], along(steep)[1] - along(flat)[1]];
+    picture.step(1.0 / 60.0, 11.0, flat, origin_mm);
+    let [x, _, z] = picture.shaft.tip_mm;
+    let held = along(steep);
+    assert!((x - held[0]).abs() < 1e-4 && (z - held[1]).abs() < 1e-4, "{x}, {z}, not {held:?}");
 }
