@@ -69,4 +69,10 @@ impl EffectReport for Defined {
     fn experiment(&self, other: EffectName) -> Option<&'static str> {
         (other == EffectName::ElectricalLag).then_some(experiments::PHASE)
     }
+    fn fault_of_a_log(&self) -> Option<&'static str> {
+        // Only the time between the two columns is in a log.
+        Some(
+            "readings that are logged late look the same as this delay: compare the clocks of command and reading before the drive is changed",
+        )
+    }
 }

@@ -1,7 +1,6 @@
 //! Notes that a reader has to know: commands that act early or late, an inertia far from the rig's,
 //! and what a log alone cannot distinguish from a name.
 
-use crate::laws::EffectName;
 use crate::pipeline::diagnosis::{Moved, NamedEffect};
 
 /// Standard deviations from the rig's value at which a value is reported as far from it.
@@ -19,17 +18,8 @@ const HIDDEN: &str =
 
 /// The notes on a diagnosis, each a clause.
 pub(crate) fn notes(moved: &Moved, named: &[NamedEffect]) -> Vec<String> {
-    let delay = named.iter().find(|effect| effect.name == EffectName::CommandDelay);
-    let delay = delay.and_then(|effect| effect.parameters.get("delay"));
-    of_refit(moved).into_iter().chain(delay.map(|delay| late_reading(delay.value))).collect()
-}
-
-/// The note on a delay, s: only the time between the two columns is in a log.
-fn late_reading(delay: f64) -> String {
-    format!(
-        "readings that are logged {:.3} ms late look the same as this delay: compare the clocks of command and reading before the drive is changed",
-        1e3 * delay
-    )
+    let of_a_log = named.iter().filter_map(|effect| effect.name.definition().fault_of_a_log());
+    of_refit(moved).into_iter().chain(of_a_log.map(str::to_owned)).collect()
 }
 
 fn of_refit(moved: &Moved) -> Vec<String> {

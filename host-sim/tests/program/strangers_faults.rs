@@ -61,7 +61,7 @@ fn readings_that_are_logged_late_are_said_to_look_like_a_delay() {
     // The interval, 9.3 to 10.4 ms, misses the truth: the shape is not moved again once friction is in.
     assert!((0.008..0.014).contains(&seconds), "{delay}");
     let notes = report["notes"].as_array().expect("notes");
-    let says = |note: &Value| note.as_str().is_some_and(|note| note.contains(" ms late look the same"));
+    let says = |note: &Value| note.as_str().is_some_and(|note| note.contains("logged late look the same"));
     assert!(notes.iter().any(says), "{notes:?}");
 }
 

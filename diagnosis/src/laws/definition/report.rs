@@ -116,4 +116,9 @@ pub(crate) trait EffectReport {
     fn experiment(&self, _other: EffectName) -> Option<&'static str> {
         None
     }
+
+    /// Returns a clause on the fault of a log that looks the same as it; none where there is none.
+    fn fault_of_a_log(&self) -> Option<&'static str> {
+        None
+    }
 }
