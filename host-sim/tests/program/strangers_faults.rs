@@ -58,7 +58,8 @@ fn readings_that_are_logged_late_are_said_to_look_like_a_delay() {
     let effects = report["effects"].as_array().expect("effects");
     let delay = effects.iter().find(|one| one["name"] == "command_delay").expect("the time between");
     let seconds = delay["parameters"]["delay"]["value"].as_f64().expect("a delay");
-    // The interval, 9.3 to 10.4 ms, misses the truth: the shape is not moved again once friction is in.
+    // The interval, 9.3 to 10.4 ms, misses the truth: the shape is not moved again once friction is
+    // in.
     assert!((0.008..0.014).contains(&seconds), "{delay}");
     let notes = report["notes"].as_array().expect("notes");
     let says = |note: &Value| note.as_str().is_some_and(|note| note.contains("logged late look the same"));
