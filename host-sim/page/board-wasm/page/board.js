@@ -65,7 +65,8 @@ function show() {
   }
   byId("download").hidden = core.file() === "";
   // An open guide deals with the faults of its own.
-  byId("clear").hidden = !byId("fault").hasAttribute("data-bad") || document.body.hasAttribute("data-guide");
+  const isOpen = document.body.hasAttribute("data-guide") && !steps.ended;
+  byId("clear").hidden = !byId("fault").hasAttribute("data-bad") || isOpen;
 }
 
 function showBoard({ live, board, needle, reading, fault, crash, timing, frames, lost_frames, lost_samples, events }) {
