@@ -39,12 +39,22 @@ fn main() {
     println!("cargo::rustc-link-arg-tests=-Tembedded-test.x");
 }
 
-/// The commit as `link::build::Build` reads it: eight digits of its hash, with a `+` if the sources
-/// of the image differ from it; nothing outside a git checkout. The variable of the environment
-/// counts before the checkout.
+/// The commit as `link::build::Build` reads it: eight digits of its hash, with a `+` if what the
+/// image is made of differs from it; nothing outside a git checkout. The variable of the
+/// environment counts before the checkout.
 fn commit() -> String {
-    const SOURCES: [&str; 6] =
-        ["../control-core/src", "../link/src", "src", "Cargo.toml", "../Cargo.toml", "../Cargo.lock"];
+    const SOURCES: [&str; 10] = [
+        "../control-core/src",
+        "../control-core/Cargo.toml",
+        "../link/src",
+        "../link/Cargo.toml",
+        "src",
+        "Cargo.toml",
+        "build.rs",
+        "../memory.x",
+        "../Cargo.toml",
+        "../Cargo.lock",
+    ];
     println!("cargo::rerun-if-env-changed=NEEDLE_BUILD");
     if let Ok(build) = env::var("NEEDLE_BUILD") {
         return build;
@@ -53,7 +63,8 @@ fn commit() -> String {
         let output = Command::new("git").args(arguments).output().ok().filter(|o| o.status.success())?;
         Some(String::from_utf8_lossy(&output.stdout).trim().to_string())
     };
-    let watched = ["HEAD", "index"].iter().filter_map(|file| git(&["rev-parse", "--git-path", file]));
+    // An amended commit, or a reset to another, may change neither HEAD nor the index.
+    let watched = ["logs/HEAD", "index"].iter().filter_map(|file| git(&["rev-parse", "--git-path", file]));
     for path in SOURCES.iter().map(ToString::to_string).chain(watched) {
         println!("cargo::rerun-if-changed={path}");
     }

@@ -20,6 +20,7 @@ use programs::{EXAMPLES, PEERS};
 use std::fs;
 use std::process::{Command, Stdio};
 use table::Measured;
+pub(crate) use values::board_lines_in;
 use values::{Values, peer};
 
 /// Measures, prints the tables, writes `target/bench.json`. Where `names` has any, only what gives

@@ -20,6 +20,7 @@ mod mutants;
 mod python;
 mod readme;
 mod real_recordings;
+mod rig;
 mod rows;
 mod setup;
 mod shell;
@@ -47,12 +48,14 @@ The project's chores.
                                 answers mutants proof
   cargo xtask firmware          builds the flash image; prints its path, flash, RAM and worst stack use
   cargo xtask flash [--dfu]     flashes it with probe-rs; --dfu: over USB, without a probe
-                                both, and board-test, take --board: discovery (default), nucleo-f429zi
+                                both, board-test and rig take --board: discovery (default), nucleo-f429zi
   cargo xtask dist              both boards' images (ELF, BIN, DFU) and the program for this PC, to hand on: target/dist
   cargo xtask wasm              builds what the page computes in the browser, into host-sim/page/js
   cargo xtask site              the whole simulator as one folder without a server: target/site
   cargo xtask wiring            draws both boards' wiring from the tables in docs/guide/hardware.md
   cargo xtask board-test        the image's hardware, on a real board; says so where there is none
+  cargo xtask rig               the same on the emulated boards, and the list of faults, as a table with the times;
+                                then board-test
   cargo xtask bench [ROW…]      measures, prints the table and writes target/bench.json
   cargo xtask counts            the instructions of hot paths against those written down; --renew writes them down,
                                 --shares prints the source files in which they are spent
@@ -85,6 +88,7 @@ fn main() -> ExitCode {
         "site" => no_more(rest).and_then(|()| site::run()),
         "nightly" => test::nightly(rest),
         "board-test" => for_board(rest, board_test::run),
+        "rig" => for_board(rest, rig::run),
         "wiring" => no_more(rest).and_then(|()| wiring::run()),
         "answers" => answers::run(rest),
         "mutants" => mutants::run(rest),

@@ -28,6 +28,23 @@ fn refused(rig: &mut Rig, interlock: Interlock) {
     assert_eq!(why, CommandRefusal::Interlocked(interlock));
 }
 
+/// However it was built: by `cargo xtask firmware`, not only by `dist`.
+#[test]
+fn each_image_says_of_which_commit_it_is() {
+    let git = |arguments: &[&str]| {
+        let output = std::process::Command::new("git").args(arguments).output().expect("git");
+        output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().to_string())
+    };
+    let head = git(&["rev-parse", "--short=8", "HEAD"]).unwrap_or_else(|| "unknown build".into());
+    let is_clean = git(&["status", "--porcelain"]).is_none_or(|changes| changes.is_empty());
+    for wiring in [Wiring::default(), Wiring::nucleo_f429zi()] {
+        let rig = Rig::connected(wiring, plant::held());
+        let build = rig.pc.heard.hello.as_ref().expect("a hello").build;
+        assert!(build.to_string().starts_with(&head), "built before the last commit, {head}? {build}");
+        assert!(!is_clean || !build.is_changed, "nothing is changed");
+    }
+}
+
 /// Takes more than 5 s: a whole insertion, as in `control.rs`.
 #[test]
 fn it_computes_what_control_core_computes() {

@@ -130,6 +130,8 @@ fn a_board_is_shown_and_commissioned_in_the_page() {
 fn commission() -> Result<(), Error> {
     let mut bench = Bench::open("page-board")?;
     bench.page.photograph(&bench.scratch.join("closed.png"))?;
+    let shown = bench.page.evaluate("document.getElementById('stop').offsetHeight > 0")?;
+    check("Stop is always there", shown == json!(true), shown)?;
     bench.connect()?;
     bench.until("the figures", "document.getElementById('late').textContent !== '–' && document.getElementById('depth').textContent !== '–'")?;
     bench.page.photograph(&bench.scratch.join("view.png"))?;
@@ -138,6 +140,14 @@ fn commission() -> Result<(), Error> {
     let only_greets =
         bench.commands.iter().all(|command| matches!(command, Command::Hello { .. } | Command::Stop));
     check("it only greets", only_greets, &bench.commands)?;
+    let clears = bench.page.evaluate("!document.getElementById('clear').hidden")?;
+    check("there is no fault to clear", clears == json!(false), clears)?;
+    bench.commands.clear();
+    bench.page.click("stop")?;
+    for _ in 0..10 {
+        bench.until("an exchange", "true")?;
+    }
+    check("a stop is sent at once", bench.commands.contains(&Command::Stop), &bench.commands)?;
     bench.page.click("commission")?;
     for step in 1..=ACTS.len() {
         bench.begin(step)?;

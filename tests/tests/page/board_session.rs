@@ -109,6 +109,11 @@ impl Cable {
         self.commands.iter().filter(|command| !is_mild(command)).collect()
     }
 
+    /// True while an excitation plays.
+    fn moves(&self) -> bool {
+        self.message("board")["needle"]["state"] == "excitation"
+    }
+
     fn gives_torque(&self) -> bool {
         self.commands
             .iter()
@@ -253,12 +258,108 @@ fn a_guide_that_is_left_sends_a_stop() {
     assert!(cable.commands.contains(&Command::Stop) && !cable.gives_torque(), "{:?}", cable.commands);
 }
 
+/// The page's own message, as it is in `board.js`.
+fn weighing(correct: bool) -> Task {
+    let message = serde_json::json!({ "do": "weigh", "grams": 100, "correct": correct });
+    serde_json::from_value(message).expect("a task")
+}
+
+/// A commissioned device whose motor gives `gain` times what it is asked for.
+fn weighed(gain: f64, wiring: Wiring) -> Cable {
+    let scale = characterise::scale(&characterise::configuration()).expect("the default scale");
+    let mut rig = writer::nominal_rig(&scale);
+    rig.actuator.gain *= gain;
+    // The 30 g and 0.06 N of its record: what commissioning finds with the wrong torque.
+    (rig.model.inertia, rig.model.coulomb) = (3e-6 * gain, Some(6e-4 * gain));
+    let line = VirtualLine::commissioned(&rig, "the nominal rig", 10.0).expect("a device");
+    Cable::to(line.wired(wiring))
+}
+
+#[test]
+fn weighing_waits_for_each_press_and_corrects_a_newton() {
+    let mut cable = weighed(0.5, Wiring::default());
+    cable.run(Duration::from_millis(200));
+    cable.session.begin(weighing(true)).expect("its numbers are sound");
+    let acts = [Act::Tilt(std::f64::consts::FRAC_PI_2), Act::Hang(100.0), Act::HandsOff];
+    for (step, act) in (1..).zip(acts) {
+        cable.run_until(Duration::from_secs(90), |cable| cable.asked() == Some(step));
+        let guide = cable.message("guide");
+        assert_eq!(guide["steps"][step - 1]["moves"], true, "{guide}");
+        cable.commands.clear();
+        cable.run(Duration::from_secs(1));
+        assert!(!cable.gives_torque(), "before the press of step {step}");
+        cable.session.answer(GuideAnswer::Begin { step });
+        cable.line.act(act);
+        // The pad takes the weight as soon as nothing moves it any more.
+        cable.run_until(Duration::from_secs(10), |cable| cable.moves());
+        cable.run_until(Duration::from_secs(30), |cable| !cable.moves());
+        cable.line.act(Act::Hang(0.0));
+    }
+    cable.run_until(Duration::from_secs(30), |cable| !cable.message("guide")["end"].is_null());
+    let end = &cable.message("guide")["end"];
+    assert_eq!(end["well"], true, "{end}");
+    let text = Text { origin: "device.toml".into(), text: cable.session.file().expect("a file").to_owned() };
+    let found = DeviceConfig::parse(text).expect("it is read again").device;
+    let full_scale = found.full_scale_torque.0.to_num::<f64>();
+    let within = f64::from(found.torque_uncertainty) * 1e-3;
+    assert!((full_scale / 14.4 - 1.0).abs() <= within && within < 0.1, "{full_scale} mN·m, {within}");
+}
+
+/// Motor leads that were swapped after commissioning: the needle runs away, and the fault stays
+/// until a person clears it.
+#[test]
+fn a_fault_is_cleared_by_a_press_and_by_nothing_else() {
+    let mut cable = weighed(1.0, Wiring { leads_reversed: true, ..Wiring::default() });
+    cable.run(Duration::from_millis(200));
+    cable.session.begin(weighing(false)).expect("its numbers are sound");
+    cable.run_until(Duration::from_secs(5), |cable| cable.asked() == Some(1));
+    cable.session.answer(GuideAnswer::Begin { step: 1 });
+    cable.line.act(Act::Tilt(std::f64::consts::FRAC_PI_2));
+    cable.run_until(Duration::from_secs(30), |cable| !cable.message("guide")["end"].is_null());
+    assert_eq!(cable.message("guide")["end"]["well"], false);
+    cable.session.answer(GuideAnswer::Leave);
+    cable.commands.clear();
+    cable.run(Duration::from_secs(3));
+    assert!(cable.strong().is_empty(), "{:?}", cable.strong());
+    assert!(cable.message("board")["fault"].is_string(), "{}", cable.message("board"));
+    cable.session.clear();
+    cable.run(Duration::from_millis(100));
+    assert_eq!(cable.strong(), [&Command::Clear], "and no torque");
+    let stop = cable.commands.iter().position(|command| *command == Command::Stop);
+    let clear = cable.commands.iter().position(|command| *command == Command::Clear);
+    assert!(stop.is_some() && stop < clear, "it is taken after a stop only: {:?}", cable.commands);
+    assert!(cable.message("board")["fault"].is_null(), "{}", cable.message("board"));
+}
+
+#[test]
+fn a_stop_is_always_there_and_ends_an_open_guide() {
+    let mut cable = Cable::new();
+    cable.session.stop();
+    cable.run(EXCHANGE * 2);
+    assert!(cable.commands.contains(&Command::Stop), "without a guide: {:?}", cable.commands);
+    cable.session.begin(TASK).expect("sound");
+    for step in 1..=STEPS {
+        cable.begin(step);
+    }
+    cable.run_until(Duration::from_secs(5), Cable::gives_torque);
+    cable.run(Duration::from_millis(50));
+    cable.commands.clear();
+    cable.session.stop();
+    cable.run(EXCHANGE);
+    assert!(cable.commands.contains(&Command::Stop), "with the next bytes: {:?}", cable.commands);
+    cable.run(Duration::from_secs(3));
+    assert!(!cable.gives_torque(), "{:?}", cable.commands);
+    assert_eq!(cable.message("guide")["end"]["well"], false, "{}", cable.message("guide"));
+    assert_eq!(cable.message("board")["needle"]["state"], "idle", "{}", cable.message("board"));
+}
+
 #[test]
 fn numbers_that_make_no_sense_are_refused() {
     for wrong in [
         Task::Commission { turns: 0, pull_mm: 100.0, counts_per_turn: None },
         Task::Commission { turns: 5, pull_mm: f64::NAN, counts_per_turn: None },
         Task::Commission { turns: 5, pull_mm: 100.0, counts_per_turn: Some(3) },
+        Task::Weigh { grams: 0.0, correct: true },
         Task::Compensate { rig: "nonsense".into(), share: 1.0 },
     ] {
         let why = Session::default().begin(wrong.clone()).expect_err("it is refused").to_string();

@@ -1,4 +1,4 @@
-// The page of a real board: connects, shows what it says, and offers the guide and the update. It begins nothing by itself.
+// The page of a real board: connects, shows what it says, and offers the guides and the update. It begins nothing by itself, and Stop is always there.
 
 import * as core from "./core.js";
 import { GuideSteps, write } from "./guide_steps.js";
@@ -49,6 +49,7 @@ function show() {
   write(byId("connect"), port ? "Disconnect" : "Connect");
   byId("update").disabled = updating || port !== null || !("usb" in navigator) || !byId("image").files.length;
   document.body.toggleAttribute("data-guide", false);
+  byId("clear").hidden = true;
   if (!port) {
     document.body.toggleAttribute("data-live", false);
     return value("state", "Not connected");
@@ -63,6 +64,9 @@ function show() {
     }
   }
   byId("download").hidden = core.file() === "";
+  // An open guide deals with the faults of its own.
+  const isOpen = document.body.hasAttribute("data-guide") && !steps.ended;
+  byId("clear").hidden = !byId("fault").hasAttribute("data-bad") || isOpen;
 }
 
 function showBoard({ live, board, needle, reading, fault, crash, timing, frames, lost_frames, lost_samples, events }) {
@@ -98,6 +102,11 @@ function begin(task) {
   show();
 }
 
+function stop() {
+  core.stop();
+  port?.exchange(new Uint8Array());
+}
+
 const number = (id) => Number(byId(id).value);
 
 function offer(name, text) {
@@ -128,6 +137,9 @@ async function updateNow() {
 }
 
 byId("connect").addEventListener("click", () => (port ? port.close() : connect()));
+byId("stop").addEventListener("click", stop);
+document.addEventListener("keydown", ({ key }) => key === "Escape" && stop());
+byId("clear").addEventListener("click", () => core.clear());
 byId("commission").addEventListener("click", () => begin({
   do: "commission", turns: number("turns"), pull_mm: number("pull"), counts_per_turn: byId("per-turn").value ? number("per-turn") : null,
 }));

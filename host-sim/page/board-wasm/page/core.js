@@ -31,6 +31,9 @@ export const tell = (now) => text(core.board_tell(now)).split("\n").map((line) =
 /** @returns {string} why it cannot be, or nothing */
 export const begin = (task) => text(core.board_begin(give(JSON.stringify(task))));
 export const answer = (message) => text(core.board_answer(give(JSON.stringify(message))));
+/** The next bytes take the torque away; an open guide is left. */
+export const stop = () => core.board_stop();
+export const clear = () => core.board_clear();
 export const file = () => text(core.board_file());
 
 /** @returns {string} why it cannot be, or nothing */

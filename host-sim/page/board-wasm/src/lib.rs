@@ -78,6 +78,18 @@ pub extern "C" fn board_tell(now_ms: f64) -> u32 {
     SESSION.with_borrow(|session| say(session.tell(time(now_ms)).as_bytes()))
 }
 
+/// A person has pressed Stop.
+#[unsafe(no_mangle)]
+pub extern "C" fn board_stop() {
+    SESSION.with_borrow_mut(Session::stop);
+}
+
+/// A person has looked at the device, and clears its fault.
+#[unsafe(no_mangle)]
+pub extern "C" fn board_clear() {
+    SESSION.with_borrow_mut(Session::clear);
+}
+
 /// Begins the task in `count` bytes of JSON. Returns the length of why not, or 0.
 #[unsafe(no_mangle)]
 pub extern "C" fn board_begin(count: u32) -> u32 {

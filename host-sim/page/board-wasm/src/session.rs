@@ -2,7 +2,8 @@
 //! session: nothing that was asked for in an earlier one is left.
 //!
 //! By itself a session says hello and stop, and nothing else. Everything beyond belongs to a work
-//! that a person began, and that ends when the board starts anew.
+//! that a person began, and that ends when the board starts anew; but for the clearing of a fault,
+//! which a person asks for.
 
 use crate::view::View;
 use crate::work::{Task, Work};
@@ -27,7 +28,16 @@ pub struct Session {
     /// The board speaks another version: it is not greeted again.
     refused: Option<String>,
     work: Option<Work>,
+    /// A person has pressed Stop, or Clear fault, and nothing has been sent of it yet.
+    pressed: Option<Press>,
     out: Vec<u8>,
+}
+
+/// A button that is there beside every guide.
+#[derive(Clone, Copy, PartialEq)]
+enum Press {
+    Stop,
+    Clear,
 }
 
 impl Session {
@@ -42,6 +52,12 @@ impl Session {
                 *refused = Some(why.to_string());
             }
         });
+        if let Some(press) = self.pressed.take() {
+            self.greet(now);
+            if press == Press::Clear {
+                self.send(Command::Clear);
+            }
+        }
         let has_restarted = self.view.take_restart();
         if let Some(work) = self.work.as_mut().filter(|work| work.is_running()) {
             if has_restarted {
@@ -79,6 +95,22 @@ impl Session {
         }
     }
 
+    /// A person has pressed Stop: the next bytes take the torque away, and an open guide is left.
+    pub fn stop(&mut self) {
+        self.pressed = Some(Press::Stop);
+        if let Some(work) = self.work.as_mut().filter(|work| work.is_running()) {
+            work.answer(GuideAnswer::Leave);
+        }
+    }
+
+    /// A person has looked at the device and clears its fault. A guide that is open deals with
+    /// those of its own.
+    pub fn clear(&mut self) {
+        if !self.work.as_ref().is_some_and(Work::is_running) {
+            self.pressed = Some(Press::Clear);
+        }
+    }
+
     /// Returns the messages for the page, one JSON text a line.
     pub fn tell(&self, now: Duration) -> String {
         let mut lines = self.view.tell(now);
@@ -102,11 +134,15 @@ impl Session {
     fn greet(&mut self, now: Duration) {
         self.greeted = Some(now);
         for command in [Command::Hello { version: PROTOCOL_VERSION }, Command::Stop] {
-            let mut frame = [0; MAX_FRAME];
-            // Every command fits MAX_FRAME: `link` tests the longest.
-            if let Ok((_, length)) = self.commands.encode(command, &mut frame) {
-                self.out.extend(&frame[..length]);
-            }
+            self.send(command);
+        }
+    }
+
+    fn send(&mut self, command: Command) {
+        let mut frame = [0; MAX_FRAME];
+        // Every command fits MAX_FRAME: `link` tests the longest.
+        if let Ok((_, length)) = self.commands.encode(command, &mut frame) {
+            self.out.extend(&frame[..length]);
         }
     }
 }
