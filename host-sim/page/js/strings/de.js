@@ -193,7 +193,7 @@ export default {
   "tissue.gluteus": "Gesäßmuskel",
   "tissue.layer": "Schicht",
   // Plots.
-  "plot.time": "Tiefe, Kraft und Moment über der Zeit",
+  "plot.time": "Tiefe, Kraft und Moment",
   "plot.computed": "berechnet",
   "plot.motor": "Motor",
   "plot.time_label": "Tiefe in mm, Kraft in N und Moment in mN·m während der letzten zehn Sekunden",

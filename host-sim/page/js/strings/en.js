@@ -193,7 +193,7 @@ export default {
   "tissue.gluteus": "gluteus",
   "tissue.layer": "layer",
   // Plots.
-  "plot.time": "Depth, force and torque against time",
+  "plot.time": "Depth, force and torque",
   "plot.computed": "computed",
   "plot.motor": "motor",
   "plot.time_label": "Depth in mm, force in N and torque in mN·m over the last ten seconds",

@@ -193,7 +193,7 @@ export default {
   "tissue.gluteus": "muscle fessier",
   "tissue.layer": "couche",
   // Plots.
-  "plot.time": "Profondeur, force et couple selon le temps",
+  "plot.time": "Profondeur, force et couple",
   "plot.computed": "calculée",
   "plot.motor": "moteur",
   "plot.time_label": "Profondeur en mm, force en N et couple en mN·m sur les dix dernières secondes",
