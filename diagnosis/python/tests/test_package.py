@@ -81,14 +81,19 @@ def test_a_formula_is_searched_and_a_wrong_one_refused(frames):
 
 
 def test_an_experiment_is_designed_from_a_report(report, tmp_path):
-    designed = nd.experiment(report, tmp_path / "next", travel=2.0, seconds=8.0)
+    demo = Path(__file__).parents[3] / "host-sim" / "demo" / "cannot-tell"
+    unsure = nd.diagnose(demo / "rig.toml", [demo / "fit-a.csv", demo / "fit-b.csv"], demo / "holdout.csv")
+    limits = {"travel": 6.0, "speed": 8.0, "force": 4.0, "seconds": 8.0}
+    designed = nd.experiment(unsure, tmp_path / "next", **limits)
     assert {"reference.csv", "command.csv"} <= {path.name for path in designed.files}, designed
-    reference = pd.read_csv(tmp_path / "next" / "command.csv")
-    assert 3.0 < reference["time_s"].iloc[-1] <= 8.1 and designed.summary
-    again = nd.experiment(tmp_path / "next" / "report", tmp_path / "again", travel=2.0, seconds=8.0)
+    command = pd.read_csv(tmp_path / "next" / "command.csv")
+    assert 3.0 < command.iloc[-1, 0] <= 8.1 and designed.summary, command
+    again = nd.experiment(tmp_path / "next" / "report", tmp_path / "again", **limits)
     assert again.summary == designed.summary
     with pytest.raises(nd.InputError, match="4 to 30"):
-        nd.experiment(report, tmp_path / "next", seconds=60.0)
+        nd.experiment(unsure, tmp_path / "next", seconds=60.0)
+    with pytest.raises(nd.InputError, match="nothing to distinguish"):
+        nd.experiment(report, tmp_path / "sure")
 
 
 def test_a_virtual_device_settles_its_diagnosis(tmp_path):
