@@ -56,7 +56,7 @@ fn visit() -> Result<(), Error> {
              document.body.dispatchEvent(new DragEvent('drop', {{ dataTransfer: data, bubbles: true }})); }})()"
         )
     };
-    page.wait("a page", SOME_TIME, "document.getElementById('forget') !== null")?;
+    page.wait("a page", SOME_TIME, "document.readyState === 'complete'")?;
     page.evaluate(&dropped("photo.bin", "\u{1}\u{2}no table"))?;
     page.wait(
         "a refusal in words",
