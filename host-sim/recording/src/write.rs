@@ -29,8 +29,8 @@ const MOST_OF_A_NAME: u32 = 9_999;
 const FLUSH_TICKS: u64 = TICK_HZ as u64 / 4;
 /// Ticks from one transform for Foxglove to the next: 100 a second.
 const TRANSFORM_TICKS: u64 = TICK_HZ as u64 / 100;
-/// Topic, package, name and fields of the numbers that are written with each pose: the last one is
-/// the torque at the converter then, and no number before the device has said its scale.
+/// Topic, package, name and fields of the numbers that are written with each transform: the last
+/// one is the torque at the converter then, and no number before the device has said its scale.
 const NUMBERS: (&str, &str, &str, [&str; 4]) =
     ("/needle", "needle", "Numbers", ["depth_mm", "speed_mm_s", "force_n", "torque_mnm"]);
 const NS_PER_TICK: u64 = 1_000_000_000 / TICK_HZ as u64;
@@ -177,12 +177,12 @@ impl<W: Write + Seek> Recorder<W> {
     pub fn pose(&mut self, pose: &frames::Pose) -> Result<(), Error> {
         let pose = Pose::from(pose);
         self.put(3, &pose)?;
-        let numbers = [pose.depth_mm, pose.speed_mm_s, pose.force_n, self.torque_mnm];
-        self.write(self.numbers, &Fields::default().doubles(&numbers).bytes())?;
         if self.drawn_at.is_some_and(|last| pose.tick.abs_diff(last) < TRANSFORM_TICKS) {
             return Ok(());
         }
         self.drawn_at = Some(pose.tick);
+        let numbers = [pose.depth_mm, pose.speed_mm_s, pose.force_n, self.torque_mnm];
+        self.write(self.numbers, &Fields::default().doubles(&numbers).bytes())?;
         let tilt_rad = f64::from(pose.tilt_mrad) / 1_000.0;
         let transform = foxglove::transform(self.now_ns(), pose.depth_mm, tilt_rad);
         self.write(self.drawn[0], &transform)
