@@ -71,13 +71,20 @@ fn read_all(request: &Request) -> Result<(Rig, Vec<Recording>, Vec<Recording>), 
         let text = std::fs::read_to_string(path).map_err(|cause| {
             InputError::new(format!("{file}: the effects cannot be read ({cause}); check its path"))
         })?;
-        rig.searched = laws::read_effects(&text, &file).map_err(InputError::new)?;
+        search_effects(&mut rig, &text, &file)?;
     }
     let read =
         |paths: &[PathBuf]| paths.iter().map(|path| Recording::read(path)).collect::<Result<Vec<_>, _>>();
     let (fit, holdout) = (read(&request.fit)?, read(&request.holdout)?);
     data::sets::check(&rig, &fit, &holdout)?;
     Ok((rig, fit, holdout))
+}
+
+/// Has a diagnosis of a rig also search the formulas of a file of effects, given by its text and
+/// its name in errors.
+pub fn search_effects(rig: &mut Rig, text: &str, file: &str) -> Result<(), InputError> {
+    rig.searched = laws::read_effects(text, file).map_err(InputError::new)?;
+    Ok(())
 }
 
 /// The faults of recordings that are seen before any law is searched, as a diagnosis takes them

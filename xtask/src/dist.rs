@@ -1,5 +1,5 @@
-//! Makes what a lab downloads: both boards' images, a program for the PC and a Python package, each
-//! with the commit it was built from.
+//! Makes what a lab downloads: both boards' images, a program for this PC and, on Linux, one for
+//! Windows, and a Python package, each with the commit it was built from.
 
 use crate::boards::{self, Board};
 use crate::elf::Elf;
@@ -8,6 +8,9 @@ use crate::{dfu, firmware, python, setup};
 use std::fs;
 use std::path::Path;
 use std::process::Command;
+
+/// Windows on a PC, by the compiler that Debian has for it.
+const WINDOWS: &str = "x86_64-pc-windows-gnu";
 
 /// The variable that names the commit (`link/src/build.rs`).
 const BUILD: &str = "NEEDLE_BUILD";
@@ -26,7 +29,10 @@ pub(crate) fn run() -> Result<(), Error> {
     for board in &boards::ALL {
         made.extend(images(board, &folder)?);
     }
-    made.push(program(&folder)?);
+    made.push(program(&folder, None)?);
+    if cfg!(target_os = "linux") {
+        made.push(program(&folder, Some(WINDOWS))?);
+    }
     made.push(wheel(&folder)?);
     println!("built from {build}:");
     for (name, bytes) in made {
@@ -75,18 +81,26 @@ fn wheel(folder: &Path) -> Result<(String, usize), Error> {
     Ok((name, usize::try_from(bytes).unwrap_or(usize::MAX)))
 }
 
-/// Builds the program for the PC and writes it without its symbols. Returns its name and size.
-fn program(folder: &Path) -> Result<(String, usize), Error> {
-    let name = format!("host-sim{}", std::env::consts::EXE_SUFFIX);
-    shell::run(
-        shell::cargo()
-            .args(["rustc", "--release", "--ignore-rust-version", "-p", "host-sim", "--bin", "host-sim"])
-            .args(["--", "-C", "strip=symbols"]),
-    )?;
-    let built = shell::target().join("release").join(&name);
+/// Builds the program, for this PC or for another target, and writes it without its symbols.
+/// Returns its name and size.
+fn program(folder: &Path, target: Option<&str>) -> Result<(String, usize), Error> {
+    let ending = if target == Some(WINDOWS) { ".exe" } else { std::env::consts::EXE_SUFFIX };
+    let name = format!("host-sim{ending}");
+    let mut build = shell::cargo();
+    build.args(["rustc", "--release", "--ignore-rust-version", "-p", "host-sim", "--bin", "host-sim"]);
+    if let Some(target) = target {
+        let what_for = "the program for Windows";
+        setup::toolchain_for(target, what_for)?;
+        if !shell::is_on_path("x86_64-w64-mingw32-gcc") {
+            setup::install(&["gcc-mingw-w64-x86-64"], what_for)?;
+        }
+        build.args(["--target", target]);
+    }
+    shell::run(build.args(["--", "-C", "strip=symbols"]))?;
+    let built = shell::target().join(target.unwrap_or_default()).join("release").join(&name);
     let bytes = fs::read(&built).map_err(|error| unreadable(&built, &error))?;
-    let target = folder.join(&name);
-    fs::copy(&built, &target).map_err(|error| unwritable(&target, &error))?;
+    let copy = folder.join(&name);
+    fs::copy(&built, &copy).map_err(|error| unwritable(&copy, &error))?;
     Ok((name, bytes.len()))
 }
 

@@ -49,7 +49,7 @@ The project's chores.
   cargo xtask firmware          builds the flash image; prints its path, flash, RAM and worst stack use
   cargo xtask flash [--dfu]     flashes it with probe-rs; --dfu: over USB, without a probe
                                 both, board-test and rig take --board: discovery (default), nucleo-f429zi
-  cargo xtask dist              both boards' images (ELF, BIN, DFU) and the program for this PC, to hand on: target/dist
+  cargo xtask dist              both boards' images (ELF, BIN, DFU), the program for this PC and for Windows, and the Python wheel: target/dist
   cargo xtask wasm              builds what the page computes in the browser, into host-sim/page/js
   cargo xtask site              the whole simulator as one folder without a server: target/site
   cargo xtask wiring            draws both boards' wiring from the tables in docs/guide/hardware.md

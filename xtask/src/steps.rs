@@ -241,10 +241,11 @@ fn browser() -> Result<(), Error> {
 }
 
 /// Libraries of other people, each at the version that the check was written against.
-const CLIENTS: [&str; 11] = [
+const CLIENTS: [&str; 12] = [
     "pyigtl==0.3.4",
     "websockets==17.4",
     "mujoco==4.0.0",
+    "rerun-sdk==0.41.0",
     "mcap==1.6.0",
     "mcap-protobuf-support==0.6.0",
     "foxglove-schemas-protobuf==0.4.0",

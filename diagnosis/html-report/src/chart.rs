@@ -1,6 +1,6 @@
 //! Curves in a frame with scales, as SVG that takes its colours from the page.
 
-use crate::drawing::{decimals, path, round_step, ticks};
+use crate::drawing::{decimals, path, round_step, thinned, ticks};
 use crate::{decimal, safe};
 use std::fmt::Write as _;
 
@@ -87,7 +87,7 @@ impl Chart {
             let dash = if curve.dashed { " dash" } else { "" };
             let _ = write!(out, "<path class=\"s s{}{dash}\" d=\"", curve.colour);
             let place = |(x, y): (f64, f64)| (x.is_finite() && y.is_finite()).then(|| (to_x(x), to_y(y)));
-            path(&mut out, thinned(&curve.points).into_iter().map(place));
+            path(&mut out, thinned(&curve.points, COLUMNS).into_iter().map(place));
             out.push_str("\"/>");
         }
         let _ = write!(
@@ -208,27 +208,6 @@ fn draw_legend(out: &mut String, rows: &[Vec<(f64, &Curve)>]) {
     }
 }
 
-/// No more points than are seen: of each column the first, the least and the greatest.
-fn thinned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
-    if points.len() <= 4 * COLUMNS {
-        return points.to_vec();
-    }
-    let mut kept = Vec::new();
-    for part in points.chunks(points.len().div_ceil(COLUMNS)) {
-        let order = |a: &&(f64, f64), b: &&(f64, f64)| a.1.total_cmp(&b.1);
-        let mut some: Vec<(f64, f64)> = part.first().into_iter().copied().collect();
-        some.extend(part.iter().min_by(order));
-        some.extend(part.iter().max_by(order));
-        some.extend(part.last());
-        // In their order in time, so that a curve that turns back still does.
-        let place = |p: &(f64, f64)| part.iter().position(|q| q == p).unwrap_or(0);
-        some.sort_by_key(place);
-        some.dedup();
-        kept.extend(some);
-    }
-    kept
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -249,7 +228,7 @@ mod tests {
     fn a_spike_survives_thinning_and_a_gap_stays_one() {
         let mut points: Vec<(f64, f64)> = (0..50_000).map(|i| (f64::from(i), 0.0)).collect();
         points[31_234].1 = 7.0;
-        let kept = thinned(&points);
+        let kept = thinned(&points, COLUMNS);
         assert!(kept.len() < 4 * COLUMNS && kept.contains(&(31_234.0, 7.0)));
         let curve =
             Curve { points: vec![(0.0, 0.0), (1.0, f64::NAN), (2.0, 1.0), (3.0, 1.0)], ..Curve::default() };

@@ -37,12 +37,34 @@ pub fn path(out: &mut String, points: impl IntoIterator<Item = Option<(f64, f64)
     for point in points {
         pen = match point {
             Some((x, y)) => {
-                let _ = write!(out, "{pen}{x:.1} {y:.1}");
+                let _ = write!(out, "{pen}{x:.2} {y:.2}");
                 'L'
             }
             None => 'M',
         };
     }
+}
+
+/// Returns no more points than `columns` show: of each column the first, the least, the greatest
+/// and the last. A gap is a point that is not finite.
+pub fn thinned(points: &[(f64, f64)], columns: usize) -> Vec<(f64, f64)> {
+    if points.len() <= 4 * columns {
+        return points.to_vec();
+    }
+    let mut kept = Vec::new();
+    for part in points.chunks(points.len().div_ceil(columns)) {
+        let order = |a: &&(f64, f64), b: &&(f64, f64)| a.1.total_cmp(&b.1);
+        let mut some: Vec<(f64, f64)> = part.first().into_iter().copied().collect();
+        some.extend(part.iter().min_by(order));
+        some.extend(part.iter().max_by(order));
+        some.extend(part.last());
+        // In their order in time, so that a curve that turns back still does.
+        let place = |p: &(f64, f64)| part.iter().position(|q| q == p).unwrap_or(0);
+        some.sort_by_key(place);
+        some.dedup();
+        kept.extend(some);
+    }
+    kept
 }
 
 #[cfg(test)]
@@ -78,6 +100,6 @@ mod tests {
     fn a_curve_has_a_gap_where_a_point_is_missing() {
         let mut out = String::new();
         path(&mut out, [None, Some((1.0, 2.0)), Some((2.0, 2.5)), None, Some((4.0, 1.0))]);
-        assert_eq!(out, "M1.0 2.0L2.0 2.5M4.0 1.0");
+        assert_eq!(out, "M1.00 2.00L2.00 2.50M4.00 1.00");
     }
 }

@@ -1,5 +1,6 @@
-// Shows the values of a plot's curves under the pointer, and, once it is dragged over, a stretch of them alone. The curves are read back
-// from the SVG paths, so that no number is in the page twice; without this script the page shows the same curves.
+// Shows the values of a plot's curves under the pointer, and, once it is dragged over, a stretch of them alone; plots over the same
+// quantity follow. The curves are read back from the SVG paths, so that no number is in the page twice; without this script the page
+// shows the same curves.
 const create = (name, attributes) => {
   const element = document.createElementNS("http://www.w3.org/2000/svg", name);
   for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
@@ -26,11 +27,14 @@ const scaleOf = (svg) => {
   scale.toX = (px) => x0 + (px - left) / (right - left) * (x1 - x0);
   /** A place along the axis in words, on a logarithmic one the number itself. */
   scale.words = (x) => "log" in svg.dataset ? show(10 ** x, 10 ** x) : show(x, scale.xSpan());
+  scale.toPx = (x) => left + (x - x0) / (x1 - x0) * (right - left);
   scale.toY = (py) => y1 - (py - top) / (bottom - top) * (y1 - y0);
   scale.xSpan = () => scale.toX(scale.to) - scale.toX(scale.from);
   scale.isWhole = () => scale.from === left && scale.to === right;
   /** The place in the whole plot that is shown at `px`. */
   scale.whole = (px) => scale.from + (px - left) / (right - left) * (scale.to - scale.from);
+  /** The place at which one of the whole plot is shown. */
+  scale.shown = (whole) => left + (whole - scale.from) / (scale.to - scale.from) * (right - left);
   /** The place in the picture of the pointer. */
   scale.within = (event) => {
     const box = svg.getBoundingClientRect();
@@ -142,20 +146,43 @@ const dragOf = (svg, scale, choose) => {
   return { begin, moveTo, end, cancel };
 };
 
-/** Says in the title what the pointer does. */
-const explain = (svg) => {
-  const hint = create("title", {});
-  hint.textContent = `${svg.querySelector("title")?.textContent ?? ""}: drag over a stretch to see it alone, double-click for the whole`;
-  svg.querySelector("title")?.replaceWith(hint);
+/** Says above the first plot what the pointer does. */
+const explain = (plot) => {
+  const hint = document.createElement("p");
+  hint.className = "note hint";
+  hint.textContent = "Drag over a stretch of a plot to see it at full resolution, double-click for the whole; plots over the same quantity follow.";
+  plot?.before(hint);
 };
 
-document.querySelectorAll("svg[data-x]").forEach((svg, number) => {
-  const scale = scaleOf(svg), parts = framed(svg, scale, number), cursor = cursorOf(svg, scale);
-  const drag = dragOf(svg, scale, (stretch) => zoom(scale, parts, stretch));
+const plots = [...document.querySelectorAll("svg[data-x]")].map((svg, number) => {
+  const scale = scaleOf(svg);
+  return { svg, scale, parts: framed(svg, scale, number), cursor: cursorOf(svg, scale) };
+});
+
+/** The plots over the quantity that this one is over, itself among them. */
+const linked = (plot) => plots.filter(({ svg }) => svg.dataset.of === plot.svg.dataset.of);
+
+/** Shows a stretch of values in a plot and those linked to it; the whole of those that have none of it. */
+const showIn = (plot, [low, high]) => {
+  for (const { scale, parts } of linked(plot)) {
+    const [from, to] = [low, high].map((x) => scale.inside(scale.toPx(x)));
+    zoom(scale, parts, to - from > 1e-3 ? [from, to] : [scale.left, scale.right]);
+  }
+};
+
+/** Points at a place of a plot, and at the same value in those linked to it. */
+const pointAt = (plot, px) => {
+  const x = plot.scale.toX(plot.scale.whole(px));
+  for (const { scale, cursor } of linked(plot)) cursor.moveTo(scale.shown(scale.toPx(x)));
+};
+
+for (const plot of plots) {
+  const { svg, scale } = plot;
+  const drag = dragOf(svg, scale, (stretch) => showIn(plot, stretch.map(scale.toX)));
   const at = (event) => {
     const px = scale.within(event);
     drag.moveTo(px);
-    cursor.moveTo(px);
+    pointAt(plot, px);
   };
   svg.addEventListener("pointermove", at);
   svg.addEventListener("pointerdown", (event) => {
@@ -168,7 +195,7 @@ document.querySelectorAll("svg[data-x]").forEach((svg, number) => {
   });
   svg.addEventListener("pointerup", (event) => drag.end(scale.within(event)));
   svg.addEventListener("pointercancel", drag.cancel);
-  svg.addEventListener("pointerleave", cursor.hide);
-  svg.addEventListener("dblclick", () => zoom(scale, parts, [scale.left, scale.right]));
-  explain(svg);
-});
+  svg.addEventListener("pointerleave", () => linked(plot).forEach(({ cursor }) => cursor.hide()));
+  svg.addEventListener("dblclick", () => showIn(plot, [scale.left, scale.right].map(scale.toX)));
+}
+explain(document.querySelector(".plot"));

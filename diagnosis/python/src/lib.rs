@@ -7,10 +7,12 @@ use diagnosis::recording::Recording;
 use diagnosis::rig::Rig;
 use diagnosis::simulation::replay::Beside;
 use diagnosis::{Outcome, check_recordings, diagnose_recordings};
+use lab::settle::{Inputs, Plant, Progress, Settings, Subject};
 use pyo3::create_exception;
 use pyo3::exceptions::{PyOSError, PyValueError};
 use pyo3::prelude::*;
 use std::path::PathBuf;
+use std::sync::{Mutex, PoisonError};
 
 create_exception!(
     _native,
@@ -74,17 +76,120 @@ impl Diagnosis {
     }
 }
 
-/// Diagnoses recordings of a rig; other Python threads run meanwhile.
+/// Diagnoses recordings of a rig, and searches the formulas of a file of effects too; other Python
+/// threads run meanwhile, and `progress` is called with the stage and the fraction done.
 #[pyfunction]
-fn diagnose(py: Python, rig: Named, fit: Vec<Named>, holdout: Vec<Named>) -> PyResult<Diagnosis> {
+fn diagnose(
+    py: Python,
+    rig: Named,
+    fit: Vec<Named>,
+    holdout: Vec<Named>,
+    effects: Option<Named>,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<Diagnosis> {
     py.detach(|| {
-        let rig = rig_of(&rig)?;
+        let mut rig = rig_of(&rig)?;
+        if let Some((name, text)) = &effects {
+            diagnosis::search_effects(&mut rig, text, name).map_err(refused)?;
+        }
         let (fit, holdout) = (recordings(&fit)?, recordings(&holdout)?);
         if fit.is_empty() || holdout.is_empty() {
             return Err(refused("at least one recording to fit and one to hold out are needed"));
         }
-        let outcome = diagnose_recordings(&rig, &fit, &holdout, &|_, _| {}).map_err(refused)?;
+        let listener = Listener::new(progress);
+        let outcome = diagnose_recordings(&rig, &fit, &holdout, &|stage, part| listener.tell(stage, part))
+            .map_err(refused)?;
+        listener.end()?;
         Ok(Diagnosis { outcome })
+    })
+}
+
+/// A Python function that is told how far something is, until it raises.
+struct Listener {
+    function: Option<Py<PyAny>>,
+    raised: Mutex<Option<PyErr>>,
+}
+
+impl Listener {
+    fn new(function: Option<Py<PyAny>>) -> Self {
+        Self { function, raised: Mutex::default() }
+    }
+
+    fn tell(&self, stage: &str, part: f64) {
+        let Some(function) = &self.function else { return };
+        let raised = || self.raised.lock().unwrap_or_else(PoisonError::into_inner);
+        if raised().is_none()
+            && let Err(error) = Python::attach(|py| function.call1(py, (stage, part)))
+        {
+            *raised() = Some(error);
+        }
+    }
+
+    /// Raises what the function raised, once the work is done.
+    fn end(self) -> PyResult<()> {
+        self.raised.into_inner().unwrap_or_else(PoisonError::into_inner).map_or(Ok(()), Err)
+    }
+}
+
+/// Designs the input that best distinguishes the rivals of a report's folder. Returns the summary
+/// and the files that it wrote.
+#[pyfunction(name = "experiment")]
+fn design(
+    py: Python,
+    report: PathBuf,
+    out: PathBuf,
+    travel_speed_force: (Option<f64>, Option<f64>, Option<f64>),
+    seconds: f64,
+    seed: u64,
+) -> PyResult<(String, Vec<PathBuf>)> {
+    let (travel, speed, force) = travel_speed_force;
+    py.detach(|| {
+        let case = experiment::Case::read(&report, travel, speed, force).map_err(refused)?;
+        let design = experiment::design(&case, seconds, seed).map_err(refused)?;
+        Ok((design.summary(), design.write(&out).map_err(PyOSError::new_err)?))
+    })
+}
+
+/// The names with their confidence, and the conclusion.
+type Settled = (Vec<(Vec<String>, f64)>, String);
+
+/// Lets a virtual device with a true mechanism settle its own diagnosis.
+#[pyfunction]
+fn settle(
+    py: Python,
+    plant: Named,
+    rig: Option<Named>,
+    out: PathBuf,
+    rounds_motion_seed_compensate: (usize, f64, u64, bool),
+    progress: Option<Py<PyAny>>,
+) -> PyResult<Settled> {
+    let (rounds, motion_s, seed, compensate) = rounds_motion_seed_compensate;
+    py.detach(|| {
+        let mechanism = Plant { rig: rig_of(&plant)?, file: plant.0 };
+        let mut subject = Subject::Virtual(Box::new(mechanism));
+        let rig = match &rig {
+            Some(rig) => rig_of(rig)?,
+            None => subject.data_sheet_rig().map_err(refused)?,
+        };
+        let device = "virtual".to_owned();
+        let settings = Settings { inputs: Inputs::Designed, rounds, motion_s, seed, compensate, device, out };
+        let listener = Listener::new(progress);
+        let settled = lab::settle::settle(&mut subject, &rig, &settings, |news| {
+            match news {
+                Progress::Asked(number, asked, why) => {
+                    listener.tell(&format!("round {number}: {asked}; why: {why}"), 0.0)
+                }
+                Progress::Played { seconds, of } => listener.tell("playing", seconds / of),
+                Progress::Diagnoses(part) => listener.tell("diagnosing", part),
+                Progress::Said(sentence) => listener.tell(sentence, 1.0),
+                Progress::Feeds(step) => listener.tell(&step.to_string(), 0.0),
+            }
+            Ok(())
+        })
+        .map_err(refused)?;
+        listener.end()?;
+        let names = settled.names.iter().map(|name| (name.class.clone(), name.confidence)).collect();
+        Ok((names, settled.conclusion))
     })
 }
 
@@ -148,6 +253,8 @@ fn _native(module: &Bound<PyModule>) -> PyResult<()> {
     module.add_class::<Diagnosis>()?;
     module.add_function(wrap_pyfunction!(check, module)?)?;
     module.add_function(wrap_pyfunction!(diagnose, module)?)?;
+    module.add_function(wrap_pyfunction!(design, module)?)?;
+    module.add_function(wrap_pyfunction!(settle, module)?)?;
     module.add_function(wrap_pyfunction!(simulate, module)?)?;
     module.add_function(wrap_pyfunction!(import_recording, module)?)
 }

@@ -51,6 +51,61 @@ def report(frames):
     return nd.diagnose(RIG, fit=frames[:2], holdout=frames[2])
 
 
+# A law that the library does not have: a force with the third power of speed.
+FORMULA = """[[effect]]
+name = "cubic"
+formula = "-c*v*v*v"
+parameters = { c = [1e-9, 1e-3] }
+"""
+
+
+def test_progress_goes_from_zero_to_one_and_may_raise(frames):
+    told = []
+    nd.diagnose(RIG, frames[:2], frames[2], effects=FORMULA, progress=lambda stage, part: told.append((stage, part)))
+    assert len({stage for stage, _ in told}) > 3 and told[-1] == ("done", 1.0), told
+    assert all(0.0 <= part <= 1.0 for _, part in told)
+
+    def stop(stage, part):
+        raise KeyError(stage)
+
+    with pytest.raises(KeyError):
+        nd.diagnose(RIG, frames[:2], frames[2], progress=stop)
+
+
+def test_a_formula_is_searched_and_a_wrong_one_refused(frames):
+    found = nd.diagnose(RIG, frames[:2], frames[2], effects=FORMULA)
+    names = [one["name"] for key in ("hypotheses", "untested", "effects") for one in found.json.get(key) or []]
+    assert "cubic" in names, names
+    with pytest.raises(nd.InputError, match="cubic"):
+        nd.diagnose(RIG, frames[:2], frames[2], effects=FORMULA.replace("v*v*v", "w*w*w"))
+
+
+def test_an_experiment_is_designed_from_a_report(report, tmp_path):
+    demo = Path(__file__).parents[3] / "host-sim" / "demo" / "cannot-tell"
+    unsure = nd.diagnose(demo / "rig.toml", [demo / "fit-a.csv", demo / "fit-b.csv"], demo / "holdout.csv")
+    limits = {"travel": 6.0, "speed": 8.0, "force": 4.0, "seconds": 8.0}
+    designed = nd.experiment(unsure, tmp_path / "next", **limits)
+    assert {"reference.csv", "command.csv"} <= {path.name for path in designed.files}, designed
+    command = pd.read_csv(tmp_path / "next" / "command.csv")
+    assert 3.0 < command.iloc[-1, 0] <= 8.1 and designed.summary, command
+    again = nd.experiment(tmp_path / "next" / "report", tmp_path / "again", **limits)
+    assert again.summary == designed.summary
+    with pytest.raises(nd.InputError, match="4 to 30"):
+        nd.experiment(unsure, tmp_path / "next", seconds=60.0)
+    with pytest.raises(nd.InputError, match="nothing to distinguish"):
+        nd.experiment(report, tmp_path / "sure")
+
+
+def test_a_virtual_device_settles_its_diagnosis(tmp_path):
+    hidden = Path(__file__).parents[3] / "tests" / "fixtures" / "hidden.toml"
+    told = []
+    settled = nd.settle(hidden, tmp_path / "out", rounds=1, motion=20.0, compensate=False, progress=lambda *one: told.append(one))
+    assert settled.conclusion and (settled.folder / "settle.html").is_file()
+    assert any(words == "diagnosing" for words, _ in told) and any(words.startswith("round 1") for words, _ in told)
+    with pytest.raises(nd.InputError, match="1 to 5"):
+        nd.settle(hidden, tmp_path / "out", rounds=9)
+
+
 def test_a_check_says_what_one_speed_cannot_show(frames):
     lively = nd.check(RIG, frames[:2], frames[2])
     assert lively[0].startswith("fit[0]: 12 s at 1000 rows a second"), lively

@@ -2,6 +2,7 @@
 //! orders are sought in the residual.
 
 use super::definition::{EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Reported, Span};
+use super::joint_terms::{JointTerms, Wave};
 use super::shape::ShapeKey;
 use super::waves::{self, Waves};
 use super::{Effect, EffectName, Subsystem, Variable};
@@ -16,6 +17,13 @@ impl EffectLaw for Defined {
         &[waves::KEYS]
     }
     fn has_own_phase(&self) -> bool {
+        true
+    }
+    fn add_to_joint(&self, effect: &Effect, joint: &mut JointTerms) -> bool {
+        joint.waves.extend(effect.waves().into_iter().map(|(name, wave)| {
+            let [cos, sin] = ["cos", "sin"].map(|part| effect.coefficient(&format!("{part}_{name}")));
+            Wave { amplitude: cos.hypot(sin), wave, phase: cos.atan2(sin) }
+        }));
         true
     }
     fn depends_on(&self) -> Option<Variable> {

@@ -22,6 +22,12 @@ pub(crate) struct JointTerms {
     pub(crate) lag: f64,
     /// A gap between motor and load.
     pub(crate) gap: Option<Gap>,
+    /// Bristles that bend before the dry friction slides.
+    pub(crate) bristles: Option<Bristles>,
+    /// A drop of the dry friction with speed.
+    pub(crate) drop: Option<Drop>,
+    /// Forces periodic in the coordinate.
+    pub(crate) waves: Vec<Wave>,
     /// Notes on what a joint and its motor cannot express.
     pub(crate) notes: Vec<String>,
 }
@@ -39,4 +45,35 @@ pub(crate) struct Gap {
     /// Natural frequency of both while a flank touches, Hz, and its damping ratio.
     pub(crate) contact_hz: f64,
     pub(crate) damping: f64,
+}
+
+/// LuGre's bristles: a part of the dry friction holds elastically before it slides.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Bristles {
+    /// That part, N·m or N.
+    pub(crate) dry: f64,
+    /// Travel over which they bend, rad or m.
+    pub(crate) deflection: f64,
+    /// Force per speed of their bending.
+    pub(crate) damping: f64,
+}
+
+/// A peak of dry friction at rest that falls by `exp(-(v/speed)²)`.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Drop {
+    /// N·m or N.
+    pub(crate) peak: f64,
+    /// rad/s or m/s.
+    pub(crate) speed: f64,
+}
+
+/// A force `amplitude · sin(wave · q + phase)`.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Wave {
+    /// N·m or N.
+    pub(crate) amplitude: f64,
+    /// rad per unit of travel.
+    pub(crate) wave: f64,
+    /// rad.
+    pub(crate) phase: f64,
 }

@@ -6,6 +6,7 @@ use super::definition::{
     Allowed, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Movable, POSITIVE, Reported, Shown,
     Span,
 };
+use super::joint_terms::{self, JointTerms};
 use super::law::{first_or_both, sign};
 use super::shape::ShapeKey;
 use super::{Effect, EffectName, State, Subsystem};
@@ -50,6 +51,17 @@ impl EffectLaw for Defined {
     }
     fn shape_keys(&self) -> &'static [&'static [ShapeKey]] {
         &[Shape::KEYS]
+    }
+    fn add_to_joint(&self, effect: &Effect, joint: &mut JointTerms) -> bool {
+        let Shape { deflection, spread } = Shape::of(effect);
+        if spread > 1.0 {
+            return false;
+        }
+        // Ours dampen by the bend as a part of the deflection, LuGre's by the bend itself.
+        let damping = effect.coefficient("damping") / deflection;
+        joint.bristles =
+            Some(joint_terms::Bristles { dry: effect.coefficient("coulomb"), deflection, damping });
+        true
     }
 }
 

@@ -5,6 +5,7 @@ use super::definition::{
     Allowed, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Movable, POSITIVE, Reported, Shown,
     Span,
 };
+use super::joint_terms::{Drop, JointTerms};
 use super::law::sign;
 use super::shape::{ShapeKey, shape};
 use super::{Effect, EffectName, State, Subsystem, Variable};
@@ -50,6 +51,11 @@ impl EffectLaw for Defined {
     }
     fn shape_keys(&self) -> &'static [&'static [ShapeKey]] {
         &[Shape::KEYS]
+    }
+    fn add_to_joint(&self, effect: &Effect, joint: &mut JointTerms) -> bool {
+        let Shape { speed, exponent } = Shape::of(effect);
+        joint.drop = (exponent == 2.0).then(|| Drop { peak: effect.coefficient("peak"), speed });
+        joint.drop.is_some()
     }
     fn depends_on(&self) -> Option<Variable> {
         Some(Variable::Speed)

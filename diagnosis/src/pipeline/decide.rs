@@ -3,11 +3,12 @@
 
 use super::assess::Assessment;
 use super::contenders::contenders;
-use super::decisive::{self, Decisive};
+use super::decisive::{self, Decisive, Residual};
 use super::diagnosis::{
     Complete, Diagnosis, FreeForce, JudgedHypothesis, Moved, NamedEffect, Reason, Rigs, Series,
 };
 use super::evidence;
+use super::law_band::Band;
 use super::patched_rig::{patch, place};
 use super::prepare::Prepared;
 use super::run_forward::{follows_worse, pooled, simulated};
@@ -68,7 +69,7 @@ pub(crate) fn decide(
     let is_open = |(name, _): &(EffectName, NotTested)| effects.iter().all(|one| !one.class.contains(name));
     let untested =
         untested::untested(&prepared.span, &prepared.nominal).into_iter().filter(is_open).collect::<Vec<_>>();
-    let decisive = decision.decisive(effects.first(), shown);
+    let decisive = decision.decisive(&effects, shown);
     let nothing_found = matches!(verdict, Verdict::Unexplained | Verdict::RandomDisturbance);
     Diagnosis::Complete(Box::new(Complete {
         verdict,
@@ -164,17 +165,20 @@ impl Decision<'_> {
     }
 
     /// The picture of the first named effect, with the nearest rival fitted instead.
-    fn decisive(&self, first: Option<&NamedEffect>, shown: &Shown) -> Option<Decisive> {
+    fn decisive(&self, named: &[NamedEffect], shown: &Shown) -> Option<Decisive> {
         let Assessment { fit, refit, weighed, holdout, .. } = self.assessment;
-        let name = first?.name;
+        let name = named.first()?.name;
         let effect = shown.patched.model.effects.iter().find(|effect| effect.name == name)?;
         let (context, smoothed) = (self.prepared.context(fit), &holdout.smoothed);
         let fitted = |model| {
             let model = context.fit(model, &shown.patched.noise, Colour::White);
             Shown::new(&context, smoothed, &weighed.estimator, refit, model)
         };
+        let (estimator, holdout) = (&weighed.estimator, smoothed.as_slice());
         let rival = decisive::nearest_rival(name, weighed, shown, fitted);
-        decisive::decisive(effect, shown, rival.as_ref(), fit, smoothed, &weighed.estimator)
+        let named: Vec<_> = named.iter().map(|one| (one.name, &one.parameters)).collect();
+        let band = Band::new(&context, estimator, &shown.patched, &named);
+        Residual { shown, band, rival, fit, holdout, estimator }.decisive(effect)
     }
 
     /// The named effects, the one that explains most first.

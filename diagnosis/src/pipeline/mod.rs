@@ -15,6 +15,7 @@ pub(crate) mod decisive;
 pub(crate) mod diagnosis;
 mod evidence;
 pub(crate) mod evidence_table;
+mod law_band;
 mod patched_rig;
 mod prepare;
 mod proposals;

@@ -18,7 +18,7 @@ pub(super) fn draw(out: &mut String, outcome: &Outcome) {
         out,
         "<section><h2>The force that was left out</h2><p class=note>The force that the simulation leaves after its values were refitted, by {}: \
          <span><i class=\"key a\"></i> fitted</span> <span><i class=\"key c\"></i> held out</span>, mean and standard deviation. \
-         <span><i class=\"key law\"></i> what {} takes of it.</span></p>",
+         <span><i class=\"key law\"></i> what {} takes of it,</span> <span><i class=\"key reach\"></i> with its values anywhere in their 95 % intervals.</span></p>",
         plot.variable,
         safe(what)
     );
@@ -26,11 +26,15 @@ pub(super) fn draw(out: &mut String, outcome: &Outcome) {
         let _ =
             write!(out, "<p class=note><i class=\"key rival\"></i> {}.</p>", safe(&sentence(what, rival)));
     }
-    let ends = plot.fitted.iter().chain(&plot.held_out).flatten();
-    let top = ends.map(|bin| bin.mean.abs() + bin.spread).fold(1e-300_f64, f64::max);
+    let bins = plot.fitted.iter().chain(&plot.held_out).flatten();
+    let band = plot.band.iter().flatten().flatten();
+    let ends = bins.map(|bin| bin.mean.abs() + bin.spread).chain(band.map(|end| end.abs()));
+    let top = ends.fold(1e-300_f64, f64::max);
     let (low, high) = (plot.at[0], plot.at[plot.at.len() - 1]);
-    let label = axis(plot, outcome.evidence.kind.length());
-    let at = frame(out, (low, high), (-top, top), &label, &format!("residual force, {unit}"));
+    let label = axis(plot, outcome);
+    let way = if plot.along_motion { " in the direction of motion" } else { "" };
+    let at = frame(out, (low, high), (-top, top), &label, &format!("residual force{way}, {unit}"));
+    reach(out, plot, &at);
     let aside = 0.12 * (high - low) / plot.at.len() as f64;
     for (class, name, bins, aside) in
         [("a", "fitted", &plot.fitted, -aside), ("c", "held out", &plot.held_out, aside)]
@@ -44,7 +48,7 @@ pub(super) fn draw(out: &mut String, outcome: &Outcome) {
         out.push_str("\"/>");
     }
     let _ = write!(out, "<path class=\"line law\" data-name=\"{}\" d=\"", safe(what));
-    path(out, plot.law.iter().zip(&plot.at).map(|(law, x)| law.map(|law| at(*x, law))));
+    path(out, plot.law.iter().zip(&plot.at).filter_map(|(law, x)| law.map(|law| Some(at(*x, law)))));
     out.push_str("\"/>");
     if let Some(rival) = &plot.rival {
         let _ = write!(out, "<path class=\"line rival\" data-name=\"{}\" d=\"", safe(rival.name.in_words()));
@@ -53,6 +57,18 @@ pub(super) fn draw(out: &mut String, outcome: &Outcome) {
     }
     close(out, &label);
     out.push_str("</section>");
+}
+
+/// The band of the law, a bar as wide as a bin each.
+fn reach(out: &mut String, plot: &Decisive, at: &impl Fn(f64, f64) -> (f64, f64)) {
+    let wide = at(plot.at[1], 0.0).0 - at(plot.at[0], 0.0).0;
+    let _ = write!(out, "<path class=reach stroke-width={wide:.1} data-name=\"95 % band\" d=\"");
+    for (x, ends) in plot.at.iter().zip(&plot.band) {
+        if let Some([low, high]) = ends.map(|ends| ends.map(|end| at(*x, end))) {
+            let _ = write!(out, "M{:.1} {:.1}V{:.1}", low.0, low.1, high.1);
+        }
+    }
+    out.push_str("\"/>");
 }
 
 /// The nearest rival in one sentence, without its full stop.
@@ -75,14 +91,15 @@ fn mark(out: &mut String, at: &impl Fn(f64, f64) -> (f64, f64), x: f64, bin: Bin
     let _ = write!(out, "M{x:.1} {low:.1}V{high:.1}M{:.1} {mean:.1}H{:.1}", x - 3.0, x + 3.0);
 }
 
-fn axis(plot: &Decisive, length: &str) -> String {
+fn axis(plot: &Decisive, outcome: &Outcome) -> String {
+    let length = outcome.evidence.kind.length();
     if let Some(period) = plot.period {
         return format!("angle within a period of {} {length}, {length}", short(period));
     }
     match plot.variable {
         "speed" => format!("speed, {length}/s"),
         "time" => "time, s".to_owned(),
-        "command" => "command".to_owned(),
+        "command" => format!("command, {}", outcome.nominal_rig.actuator.command_unit),
         "tilt" => "tilt, rad".to_owned(),
         other => format!("{other}, {length}"),
     }

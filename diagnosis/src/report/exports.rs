@@ -102,7 +102,7 @@ pub(super) fn joint_of(rig: &Rig) -> JointTerms {
     joint
 }
 
-/// A rig as one joint, which has no room for a gap.
+/// A rig as one joint, which has no room for a gap, bristles or waves.
 fn one_joint(rig: &Rig) -> JointTerms {
     let mut joint = joint_of(rig);
     if let Some(gap) = joint.gap.take() {
@@ -113,7 +113,33 @@ fn one_joint(rig: &Rig) -> JointTerms {
             gap.ratio
         ));
     }
+    note_motor(&mut joint, rig.kind);
     joint
+}
+
+/// Takes from a joint what a friction model of a motor would say, and notes it.
+pub(super) fn note_motor(joint: &mut JointTerms, kind: Kind) {
+    let (force, length) = (kind.force(), kind.length());
+    let bristles = joint.bristles.take().map(|one| {
+        format!(
+            "bristles that bend over {:.6e} {length} before {:.6e} {force} of the dry friction slides, damped by {:.6e} {force}·s/{length}",
+            one.deflection, one.dry, one.damping
+        )
+    });
+    let drop = joint.drop.take().map(|one| {
+        format!(
+            "friction that is {:.6e} {force} larger at rest and falls over {:.6e} {length}/s",
+            one.peak, one.speed
+        )
+    });
+    let waves = std::mem::take(&mut joint.waves).into_iter().map(|one| {
+        format!(
+            "{:.6e} {force} times the sine of {:.6e} times the coordinate plus {:.6e} rad",
+            one.amplitude, one.wave, one.phase
+        )
+    });
+    let all = bristles.into_iter().chain(drop).chain(waves);
+    joint.notes.extend(all.map(|text| format!("{text}: --export mjcf --into --dcmotor has it")));
 }
 
 /// Text that is valid in XML, and in its comments.

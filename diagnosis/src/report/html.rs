@@ -267,8 +267,17 @@ fn hypotheses(out: &mut String, outcome: &Outcome) {
     if r.hypotheses.is_empty() {
         return;
     }
-    out.push_str(
-        "<section><h2>What was tested</h2><div class=scroll><table><tr><th>hypothesis</th><th class=n>held-out gain</th><th>outcome</th></tr>",
+    let _ = write!(
+        out,
+        "<details><summary>What was tested: {} hypotheses, of which {} named; {} could not show in these recordings</summary>\
+         <div class=scroll><table><tr><th>hypothesis</th><th class=n>held-out gain</th><th>outcome</th></tr>",
+        r.hypotheses.len(),
+        match r.effects.len() {
+            0 => "none is".to_owned(),
+            1 => "one is".to_owned(),
+            n => format!("{n} are"),
+        },
+        r.untested.len()
     );
     let gain = |h: &Hypothesis| h.holdout_gain.unwrap_or(f64::NEG_INFINITY);
     let mut sorted: Vec<_> = r.hypotheses.iter().collect();
@@ -298,7 +307,7 @@ fn hypotheses(out: &mut String, outcome: &Outcome) {
         }
         out.push_str("</ul>");
     }
-    out.push_str("</section>");
+    out.push_str("</details>");
 }
 
 fn remains(out: &mut String, outcome: &Outcome) {

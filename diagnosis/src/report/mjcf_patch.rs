@@ -5,8 +5,9 @@
 //! patched rig; inertia and gain change as they do from the nominal rig to the patched one, because
 //! the links have an inertia of their own, and their controls may have another unit.
 
-use super::exports::{joint_of, xml};
-use super::xml::{Tag, changed, tags};
+use super::exports::{joint_of, note_motor, xml};
+use super::passive_motor;
+use super::xml::{Tag, changed, number, tags};
 use crate::data::rig::{Kind, Rig};
 use crate::data::schema::Named;
 use crate::laws::joint_terms::{Gap, JointTerms};
@@ -29,9 +30,10 @@ struct Model<'a> {
     notes: Vec<String>,
 }
 
-/// Returns the text of an MJCF file with the joint of this name as the patched rig has it. An error
-/// is a sentence without the file's name in front.
-pub fn patch(text: &str, joint: &str, nominal: &Rig, patched: &Rig) -> Result<String, String> {
+/// Returns the text of an MJCF file with the joint of this name as the patched rig has it; with
+/// `dcmotor`, which MuJoCo 4.0 reads, also its bristles, Stribeck friction and cogging. An error is
+/// a sentence without the file's name in front.
+pub fn patch(text: &str, joint: &str, nominal: &Rig, patched: &Rig, dcmotor: bool) -> Result<String, String> {
     let tags = tags(text).map_err(|at| {
         let line = 1 + text[..at].matches('\n').count();
         format!("is not well-formed XML in line {line}; open it in MuJoCo first, which says what is wrong")
@@ -45,7 +47,17 @@ pub fn patch(text: &str, joint: &str, nominal: &Rig, patched: &Rig) -> Result<St
             "the joint \"{joint}\" is a {kind} and the rig's axis a {wanted}; choose another --joint"
         ));
     }
-    let (before, after) = (joint_of(nominal), joint_of(patched));
+    let (before, mut after) = (joint_of(nominal), joint_of(patched));
+    if !dcmotor {
+        note_motor(&mut after, patched.kind);
+    }
+    if !after.waves.is_empty() && !patched.encoder.absolute {
+        let unknown = "the phase of its cogging, which counts without a zero of their own do not tell";
+        after.notes.push(unknown.into());
+    }
+    let lugre = passive_motor::lugre(&after, model.step_s());
+    // What LuGre has of the dry friction, the joint has not.
+    after.dry = (after.dry - lugre.map_or(0.0, |lugre| lugre[2])).max(0.0);
     model.notes.clone_from(&after.notes);
     let driven = after.gap.map_or_else(|| joint.to_owned(), |_| format!("{joint}_motor"));
     match after.gap {
@@ -53,17 +65,13 @@ pub fn patch(text: &str, joint: &str, nominal: &Rig, patched: &Rig) -> Result<St
         None => model.one_joint(tag, &before, &after),
     }
     model.drives(joint, &driven, &before, &after);
+    model.add_actuators(&passive_motor::tags(&driven, lugre, &after.waves));
     let mut note = String::from("<!-- patched by host-sim");
     for text in &model.notes {
         let _ = write!(note, "; not in this joint: {}", xml(text));
     }
     model.changes.push((model.tags[tag].at.start..model.tags[tag].at.start, note + " -->"));
     Ok(changed(text, model.changes))
-}
-
-/// A number as an attribute has it: seven digits.
-fn number(x: f64) -> String {
-    format!("{x:.6e}").parse::<f64>().map_or_else(|_| x.to_string(), |x| x.to_string())
 }
 
 impl<'a> Model<'a> {
@@ -234,6 +242,17 @@ impl<'a> Model<'a> {
                 other => self.notes.push(format!("an actuator <{other}>: multiply its force by {ratio:.6e}")),
             }
         }
+    }
+
+    /// Adds actuators to those of the model.
+    fn add_actuators(&mut self, text: &str) {
+        let closing = |name: &str| {
+            let all = self.tags.iter().filter(|tag| tag.name == name);
+            all.filter_map(|tag| tag.closing.clone()).next_back()
+        };
+        let place = closing("actuator").map(|at| (at, text.to_owned()));
+        let place = place.or_else(|| Some((closing("mujoco")?, format!("<actuator>{text}</actuator>"))));
+        self.changes.extend(place.filter(|_| !text.is_empty()).map(|(at, text)| (at.start..at.start, text)));
     }
 
     /// A servo, whose gains make the force.

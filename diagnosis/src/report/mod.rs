@@ -14,6 +14,7 @@ pub mod motion_picture;
 pub(crate) mod next_experiment;
 mod notes;
 pub(crate) mod outcome;
+mod passive_motor;
 mod remains;
 mod residual_plots;
 #[cfg(test)]

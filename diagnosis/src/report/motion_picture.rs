@@ -2,14 +2,14 @@
 //! as a file.
 
 use crate::simulation::comparison::{AFRESH_S, Comparison, Figures, Off, Simulated};
-use html_report::drawing::path;
+use html_report::drawing::{path, thinned};
 use html_report::plot::{HIGH, close, frame};
 use html_report::safe;
 use numerics::digits::short;
 use std::fmt::Write as _;
 
-/// Points that a line is drawn with.
-const POINTS: usize = 900;
+/// Columns of a line: with fewer than four rows in each, a reader who zooms in sees every row.
+pub(super) const COLUMNS: usize = 5_000;
 /// Rows a second in the CSV, at most.
 const RATE_HZ: f64 = 1000.0;
 
@@ -44,13 +44,13 @@ fn line(
     afresh: Option<f64>,
     at: &impl Fn(f64, f64) -> (f64, f64),
 ) {
-    let every = time.len().div_ceil(POINTS).max(1);
     let part = |t: f64| afresh.map_or(0, |seconds| (t / seconds) as u64);
     let _ = write!(out, "<path class=\"motion {class}\" data-name=\"{}\" d=\"", safe(name));
     let mut last = None;
-    let shown = time.iter().zip(values).step_by(every).flat_map(|(t, x)| {
-        let place = Some(at(*t, *x)).filter(|(_, y)| *y > 0.0 && *y < HIGH);
-        let is_new = last.replace(part(*t)) != Some(part(*t));
+    let rows: Vec<(f64, f64)> = time.iter().copied().zip(values.iter().copied()).collect();
+    let shown = thinned(&rows, COLUMNS).into_iter().flat_map(|(t, x)| {
+        let place = Some(at(t, x)).filter(|(_, y)| *y > 0.0 && *y < HIGH);
+        let is_new = last.replace(part(t)) != Some(part(t));
         is_new.then_some(None).into_iter().chain([place])
     });
     path(out, shown);

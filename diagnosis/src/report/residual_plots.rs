@@ -2,25 +2,12 @@
 
 use crate::evidence::residual_maps::Map;
 use crate::pipeline::diagnosis::Series;
+use crate::report::motion_picture::COLUMNS;
 use crate::report::outcome::Outcome;
-use html_report::drawing::path;
+use html_report::drawing::{path, thinned};
 use html_report::plot::{HIGH, close, frame};
 use html_report::safe;
 use std::fmt::Write as _;
-
-/// Envelope of a column over few enough places to draw.
-fn envelope(time: &[f64], column: &[Option<f64>], parts: usize) -> Vec<(f64, f64, f64)> {
-    let length = time.len().div_ceil(parts).max(1);
-    time.chunks(length)
-        .zip(column.chunks(length))
-        .filter_map(|(t, c)| {
-            let mut seen = c.iter().flatten();
-            let first = *seen.next()?;
-            let (low, high) = seen.fold((first, first), |(a, b), x| (a.min(*x), b.max(*x)));
-            Some((t[0], low, high))
-        })
-        .collect()
-}
 
 /// Residuals along each recording.
 pub(super) fn over_time(out: &mut String, outcome: &Outcome) {
@@ -44,20 +31,18 @@ pub(super) fn over_time(out: &mut String, outcome: &Outcome) {
         let kind = if series.held_out { "held out" } else { "fitted" };
         let _ = write!(out, "<h3>{} <small>{kind}</small></h3>", safe(&series.file));
         let last = series.time_s.last().copied().unwrap_or(1.0);
-        let before = envelope(&series.time_s, &series.nominal, 420);
-        let after = envelope(&series.time_s, &series.patched, 420);
-        let mut sizes: Vec<f64> = before.iter().chain(&after).map(|(_, a, b)| a.abs().max(b.abs())).collect();
+        let columns = [("a", "as it is", &series.nominal), ("c", after_name, &series.patched)];
+        let mut sizes: Vec<f64> =
+            columns.iter().flat_map(|(.., x)| x.iter().flatten().map(|x| x.abs())).collect();
         sizes.sort_by(f64::total_cmp);
-        let top = sizes.get(sizes.len() * 99 / 100).copied().unwrap_or(1.0).max(1e-300);
+        let top = sizes.get(sizes.len() * 997 / 1000).copied().unwrap_or(1.0).max(1e-300);
         let at = frame(out, (0.0, last), (-top, top), "time, s", &format!("residual force, {unit}"));
         marks(out, outcome, series, &at);
-        for (class, name, band) in [("a", "as it is", &before), ("c", after_name, &after)] {
+        for (class, name, column) in columns {
             let _ = write!(out, "<path class=\"band {class}\" data-name=\"{name}\" d=\"");
-            for (t, low, high) in band {
-                let (x, y0) = at(*t, *low);
-                let (_, y1) = at(*t, *high);
-                let _ = write!(out, "M{x:.1} {y0:.1}V{:.1}", y1 - 0.6);
-            }
+            let blocks: Vec<(f64, f64)> =
+                series.time_s.iter().zip(column).map(|(t, x)| (*t, x.unwrap_or(f64::NAN))).collect();
+            path(out, thinned(&blocks, COLUMNS).into_iter().map(|(t, x)| x.is_finite().then(|| at(t, x))));
             out.push_str("\"/>");
         }
         close(out, "time, s");

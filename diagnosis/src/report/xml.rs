@@ -103,3 +103,8 @@ pub(super) fn changed(text: &str, mut changes: Vec<(Range<usize>, String)>) -> S
     out.push_str(&text[from..]);
     out
 }
+
+/// A number as an attribute has it: seven digits.
+pub(super) fn number(x: f64) -> String {
+    format!("{x:.6e}").parse::<f64>().map_or_else(|_| x.to_string(), |x| x.to_string())
+}

@@ -5,15 +5,17 @@ use device_sim::error::Error;
 use diagnosis::simulation::comparison::Comparison;
 use mcap::records::MessageHeader;
 use mcap::{McapError, WriteOptions, Writer};
-use serde_json::{Value, json};
+use recording::protobuf::{self, Fields};
 use std::collections::BTreeMap;
 use std::io::Cursor;
 
 /// Messages a second on a topic, at most.
 const RATE_HZ: f64 = 1000.0;
 
-/// Returns the file: `/recording`, and `/simulation/NAME` and `/residual/NAME` for each model.
-/// Times count from the first row.
+/// Returns the file: `/recording`, and `/simulation/NAME` and `/residual/NAME` for each model, as
+/// Protobuf: position from the first row (simulations start anew from the recorded state every
+/// 0.5 s), velocity (of simulations, of the free run) and inertia times acceleration. Times count
+/// from the first row.
 pub fn mcap(compared: &Comparison) -> Result<Vec<u8>, Error> {
     written(compared)
         .map_err(|cause| Error::failed(format_args!("{}: no MCAP of it ({cause})", compared.file)))
@@ -22,9 +24,15 @@ pub fn mcap(compared: &Comparison) -> Result<Vec<u8>, Error> {
 fn written(compared: &Comparison) -> Result<Vec<u8>, McapError> {
     let options = WriteOptions::new().profile("").library(recording::version::program());
     let mut writer = Writer::with_options(Cursor::new(Vec::new()), options.compression(None))?;
-    let schema = writer.add_schema("Motion", "jsonschema", schema(compared).to_string().as_bytes())?;
+    // Units are in the names.
+    let fields = match compared.kind {
+        diagnosis::rig::Kind::Rotary => ["position_rad", "velocity_rad_s", "force_nm"],
+        diagnosis::rig::Kind::Linear => ["position_m", "velocity_m_s", "force_n"],
+    };
+    let schema = protobuf::numbers("needle", "Motion", &fields);
+    let schema = writer.add_schema("needle.Motion", "protobuf", &schema)?;
     let none = BTreeMap::new();
-    let mut topic = |name: String| writer.add_channel(schema, &name, "json", &none);
+    let mut topic = |name: String| writer.add_channel(schema, &name, "protobuf", &none);
     let recording = topic("/recording".into())?;
     let models = compared.models.iter().map(|model| {
         let name = model.model.replace(|c: char| !c.is_alphanumeric(), "_");
@@ -38,8 +46,8 @@ fn written(compared: &Comparison) -> Result<Vec<u8>, McapError> {
         let mut put = |channel_id: u16, position: f64, velocity: f64, force: f64| {
             let time = (motion.time[row] * 1e9).round() as u64;
             let header = MessageHeader { channel_id, sequence: 0, log_time: time, publish_time: time };
-            let message = json!({ "position": position, "velocity": velocity, "force": force });
-            writer.write_to_known_channel(&header, message.to_string().as_bytes())
+            let message = Fields::default().doubles(&[position, velocity, force]).bytes();
+            writer.write_to_known_channel(&header, &message)
         };
         let (position, velocity, force) = (motion.position[row], motion.velocity[row], compared.force[row]);
         put(recording, position, velocity, force)?;
@@ -53,22 +61,6 @@ fn written(compared: &Comparison) -> Result<Vec<u8>, McapError> {
     }
     writer.finish()?;
     Ok(writer.into_inner().into_inner())
-}
-
-fn schema(compared: &Comparison) -> Value {
-    let [position, velocity, force] = match compared.kind {
-        diagnosis::rig::Kind::Rotary => ["rad", "rad/s", "N·m"],
-        diagnosis::rig::Kind::Linear => ["m", "m/s", "N"],
-    };
-    let number = |description: String| json!({ "type": "number", "description": description });
-    json!({
-        "type": "object",
-        "properties": {
-            "position": number(format!("{position}, from the first row; simulations start anew from the recorded state every 0.5 s")),
-            "velocity": number(format!("{velocity}; of simulations, of the free run")),
-            "force": number(format!("{force}, inertia times acceleration")),
-        },
-    })
 }
 
 #[cfg(test)]
@@ -93,8 +85,9 @@ mod tests {
         let mut topics: BTreeMap<String, Vec<(u64, f64)>> = BTreeMap::new();
         for message in mcap::MessageStream::new(&bytes).expect("it can be read") {
             let message = message.expect("it is whole");
-            let value: Value = serde_json::from_slice(&message.data).expect("JSON");
-            let position = value["position"].as_f64().expect("a number");
+            // A tag, and the first double.
+            let position = message.data.get(1..9).expect("a double").try_into().expect("eight bytes");
+            let position = f64::from_le_bytes(position);
             topics.entry(message.channel.topic.clone()).or_default().push((message.log_time, position));
         }
         assert_eq!(

@@ -157,6 +157,7 @@ impl Run {
         let looks = (!self.headless || self.class.is_wanted()).then(|| session.subscribe());
         let _server = if self.headless { None } else { Some(serve_for_practice(session, self.address())?) };
         let recorder = self.record.as_ref().map(|path| Recorder::create(path, &setup)).transpose()?;
+        self.record.iter().try_for_each(|path| recording::views::write_beside(path))?;
         let limit = seconds.map(|s| (s * f64::from(TICK_HZ)).round() as u64);
         let stop = Arc::new(AtomicBool::new(false));
         stop_on_signals(&stop)?;

@@ -98,6 +98,7 @@ const receive = {
     view.motor = pose.motor_n;
     view.speed = pose.speed_mm_s;
     view.torque = pose.torque_mnm;
+    timePlot.learn(pose.motor_n, pose.torque_mnm);
     view.tilt = pose.tilt_rad;
     view.angle = pose.angle_rad;
     view.skinAngle = angleToSkin(scene.body, pose.angle_rad);

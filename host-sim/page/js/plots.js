@@ -1,10 +1,12 @@
-// The two plots: depth and force against time, and force against depth. Both read a Trace and allocate nothing per frame.
+// The two plots: depth, force and torque against time, and force against depth. Both read a Trace and allocate nothing per frame.
 
 import { surface } from "./canvas.js";
 import { number, t } from "./language.js";
 
 export const WINDOW_S = 10;
 const GUTTER = { left: 52, right: 10, top: 8, bottom: 24 };
+/** Room for the axis of torque. */
+const TORQUE = 58;
 /** A gap in the data longer than this is a gap in the line. */
 const GAP_S = 0.03;
 const FADE_STEPS = 8;
@@ -80,6 +82,8 @@ export class TimePlot extends Plot {
   constructor(canvas, colours) {
     super(canvas, colours);
     this.marks = []; // punctures: { t, text }
+    /** mN·m of the motor for each N at the needle; not a number until the motor has had a force. */
+    this.torquePerForce = NaN;
   }
 
   mark(t, text) {
@@ -91,6 +95,11 @@ export class TimePlot extends Plot {
     this.marks.length = 0;
   }
 
+  /** Learns the scale of torque from a pose whose force is more than rounding. */
+  learn(motorN, torqueMnm) {
+    if (Math.abs(motorN) > 0.05) this.torquePerForce = torqueMnm / motorN;
+  }
+
   draw(trace, now) {
     const { context: g, width, height } = this.surface;
     const from = this.begin(trace, now);
@@ -99,11 +108,12 @@ export class TimePlot extends Plot {
     extremes(trace, trace.lawLow, trace.lawHigh, from, this.found);
     this.force.cover(Math.min(low, this.found.low), Math.max(high, this.found.high));
     const left = GUTTER.left;
-    const wide = width - left - GUTTER.right;
+    const wide = width - left - TORQUE;
     const each = (height - GUTTER.top - GUTTER.bottom - 14) / 2;
     const second = GUTTER.top + each + 14;
     this.axes(g, t("plot.depth"), this.depth, left, GUTTER.top, wide, each, this.colours.depth);
     this.axes(g, t("plot.force"), this.force, left, second, wide, each, this.colours.force);
+    this.torque(g, left + wide, second, each);
     this.seconds(g, left, wide, height);
     this.drawMarks(g, now, left, wide, second - 7, height - GUTTER.bottom);
     g.save();
@@ -143,6 +153,27 @@ export class TimePlot extends Plot {
     g.fillStyle = colour;
     g.font = `600 12px ${this.colours.font}`;
     g.fillText(name, 0, 0);
+    g.restore();
+  }
+
+  /** The axis of the motor's torque, at the right of the strip of forces: one is the other times the roller's radius. */
+  torque(g, right, top, high) {
+    if (Number.isNaN(this.torquePerForce)) return;
+    const { force, torquePerForce } = this;
+    g.textAlign = "left";
+    g.textBaseline = "middle";
+    g.fillStyle = this.colours.muted;
+    ticks(force, high / 26, (value) => {
+      const y = Math.round(top + (high * (force.high - value)) / (force.high - force.low)) + 0.5;
+      g.fillText(label(value * torquePerForce, force.step * Math.abs(torquePerForce)), right + 6, y);
+    });
+    g.save();
+    g.translate(right + TORQUE - 8, top + high / 2);
+    g.rotate(Math.PI / 2);
+    g.textAlign = "center";
+    g.fillStyle = this.colours.motor;
+    g.font = `600 12px ${this.colours.font}`;
+    g.fillText(t("plot.torque"), 0, 0);
     g.restore();
   }
 

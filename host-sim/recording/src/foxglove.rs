@@ -1,10 +1,10 @@
 //! Foxglove's well-known messages as Protobuf: the needle's transform, and needle and tissue as a
 //! scene. A program that knows these schemas draws them without further instructions.
 //!
-//! Written here because a Protobuf library is a large build for two messages of numbers. The
-//! schemas in `schemas/foxglove` are the descriptors of PyPI's `foxglove-schemas-protobuf`; `cargo
-//! xtask test clients` compares them and reads what is written.
+//! The schemas in `schemas/foxglove` are the descriptors of PyPI's `foxglove-schemas-protobuf`;
+//! `cargo xtask test clients` compares them and reads what is written.
 
+use crate::protobuf::Fields;
 use device_sim::session::{Scene, SceneNeedle};
 
 /// Topic, name of the schema, and the schema as a `FileDescriptorSet`.
@@ -29,51 +29,14 @@ const STEEL: [f64; 4] = [0.7, 0.73, 0.77, 1.0];
 const HUB: [f64; 4] = [0.04, 0.36, 0.61, 1.0];
 const BLOOD: [f64; 4] = [0.66, 0.12, 0.2, 0.8];
 
-/// Fields of a Protobuf message, one after the other.
-#[derive(Default)]
-struct Fields(Vec<u8>);
-
-impl Fields {
-    fn varint(&mut self, mut value: u64) {
-        while value >= 0x80 {
-            self.0.push(value as u8 | 0x80);
-            value >>= 7;
-        }
-        self.0.push(value as u8);
-    }
-
-    /// A field of bytes: a text or another message.
-    fn bytes(mut self, field: u64, bytes: &[u8]) -> Self {
-        self.varint(field << 3 | 2);
-        self.varint(bytes.len() as u64);
-        self.0.extend(bytes);
-        self
-    }
-
-    fn integer(mut self, field: u64, value: u64) -> Self {
-        self.varint(field << 3);
-        self.varint(value);
-        self
-    }
-
-    /// Fields 1, 2 and so on, each a double.
-    fn doubles(mut self, values: &[f64]) -> Self {
-        for (field, value) in (1..).zip(values) {
-            self.varint(field << 3 | 1);
-            self.0.extend(value.to_le_bytes());
-        }
-        self
-    }
-}
-
 /// `Vector3`, `Quaternion` and `Color` are numbers only.
 fn numbers(values: &[f64]) -> Vec<u8> {
-    Fields::default().doubles(values).0
+    Fields::default().doubles(values).bytes()
 }
 
 /// `google.protobuf.Timestamp`.
 fn time(ns: u64) -> Vec<u8> {
-    Fields::default().integer(1, ns / 1_000_000_000).integer(2, ns % 1_000_000_000).0
+    Fields::default().integer(1, ns / 1_000_000_000).integer(2, ns % 1_000_000_000).bytes()
 }
 
 fn metres(mm: [f64; 3]) -> Vec<u8> {
@@ -86,43 +49,39 @@ pub(crate) fn transform(ns: u64, depth_mm: f64, tilt_rad: f64) -> Vec<u8> {
     let (sine, cosine) = tilt_rad.sin_cos();
     let (half_sine, half_cosine) = (tilt_rad / 2.0).sin_cos();
     Fields::default()
-        .bytes(1, &time(ns))
-        .bytes(2, SKIN.as_bytes())
-        .bytes(3, NEEDLE.as_bytes())
-        .bytes(4, &metres([cosine * depth_mm, 0.0, -sine * depth_mm]))
+        .part(1, &time(ns))
+        .part(2, SKIN.as_bytes())
+        .part(3, NEEDLE.as_bytes())
+        .part(4, &metres([cosine * depth_mm, 0.0, -sine * depth_mm]))
         // About the axis across: x points in the direction of insertion.
-        .bytes(5, &numbers(&[0.0, half_sine, 0.0, half_cosine]))
-        .0
+        .part(5, &numbers(&[0.0, half_sine, 0.0, half_cosine]))
+        .bytes()
 }
 
 /// `SceneUpdate` with the needle and, where the layers are level, the tissue.
 pub(crate) fn scene(ns: u64, scene: &Scene) -> Vec<u8> {
-    let mut update = Fields::default().bytes(2, &needle(ns, &scene.needle));
+    let mut update = Fields::default().part(2, &needle(ns, &scene.needle));
     if scene.body.is_none() {
-        update = update.bytes(2, &tissue(ns, scene));
+        update = update.part(2, &tissue(ns, scene));
     }
-    update.0
+    update.bytes()
 }
 
 /// The beginning of a `SceneEntity`, which moves with its frame.
 fn entity(ns: u64, frame: &str, name: &str) -> Fields {
-    let entity = Fields::default().bytes(1, &time(ns)).bytes(2, frame.as_bytes());
-    entity.bytes(3, name.as_bytes()).integer(5, 1)
+    let entity = Fields::default().part(1, &time(ns)).part(2, frame.as_bytes());
+    entity.part(3, name.as_bytes()).integer(5, 1)
 }
 
 fn pose(centre_mm: [f64; 3], turn: &[f64; 4]) -> Vec<u8> {
-    Fields::default().bytes(1, &metres(centre_mm)).bytes(2, &numbers(turn)).0
+    Fields::default().part(1, &metres(centre_mm)).part(2, &numbers(turn)).bytes()
 }
 
 /// A `CylinderPrimitive` along x: its middle, its heights perpendicular to the skin and across, its
 /// length.
 fn tube(centre_mm: [f64; 3], size_mm: [f64; 3], colour: &[f64; 4]) -> Vec<u8> {
-    let mut cylinder = Fields::default().bytes(1, &pose(centre_mm, &LAID)).bytes(2, &metres(size_mm));
-    for field in [3, 4] {
-        cylinder.varint(field << 3 | 1);
-        cylinder.0.extend(1.0_f64.to_le_bytes());
-    }
-    cylinder.bytes(5, &numbers(colour)).0
+    let cylinder = Fields::default().part(1, &pose(centre_mm, &LAID)).part(2, &metres(size_mm));
+    cylinder.double(3, 1.0).double(4, 1.0).part(5, &numbers(colour)).bytes()
 }
 
 fn needle(ns: u64, needle: &SceneNeedle) -> Vec<u8> {
@@ -130,7 +89,7 @@ fn needle(ns: u64, needle: &SceneNeedle) -> Vec<u8> {
     let cannula = tube([-length_mm / 2.0, 0.0, 0.0], [diameter_mm, diameter_mm, length_mm], &STEEL);
     let hub_middle = -length_mm - hub_length_mm / 2.0;
     let hub = tube([hub_middle, 0.0, 0.0], [hub_diameter_mm, hub_diameter_mm, hub_length_mm], &HUB);
-    entity(ns, NEEDLE, NEEDLE).bytes(10, &cannula).bytes(10, &hub).0
+    entity(ns, NEEDLE, NEEDLE).part(10, &cannula).part(10, &hub).bytes()
 }
 
 /// Draws slabs between the layers' tops; the vessel, which the needle points along, is in one of
@@ -143,16 +102,16 @@ fn tissue(ns: u64, scene: &Scene) -> Vec<u8> {
         let end_mm = slabs.get(number + 1).map_or(deepest, |next| next.depth_mm);
         let middle = [0.0, 0.0, -(layer.depth_mm + end_mm) / 2.0];
         let cube = Fields::default()
-            .bytes(1, &pose(middle, &UPRIGHT))
-            .bytes(2, &metres([ALONG_MM, ACROSS_MM, end_mm - layer.depth_mm]))
-            .bytes(3, &numbers(&colour(&layer.name)));
-        entity = entity.bytes(8, &cube.0);
+            .part(1, &pose(middle, &UPRIGHT))
+            .part(2, &metres([ALONG_MM, ACROSS_MM, end_mm - layer.depth_mm]))
+            .part(3, &numbers(&colour(&layer.name)));
+        entity = entity.part(8, &cube.bytes());
     }
     if let Some(vessel) = &scene.vessel {
         let middle = [0.0, vessel.offset_mm, -vessel.axis_mm];
-        entity = entity.bytes(10, &tube(middle, [vessel.height_mm, vessel.width_mm, ALONG_MM], &BLOOD));
+        entity = entity.part(10, &tube(middle, [vessel.height_mm, vessel.width_mm, ALONG_MM], &BLOOD));
     }
-    entity.0
+    entity.bytes()
 }
 
 /// The colour of a tissue, that can be seen through, as the page has it.
@@ -172,15 +131,6 @@ fn colour(tissue: &str) -> [f64; 4] {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_varint_is_the_published_one() {
-        for (value, bytes) in [(0, vec![0]), (1, vec![1]), (150, vec![0x96, 1]), (300, vec![0xac, 2])] {
-            let mut fields = Fields::default();
-            fields.varint(value);
-            assert_eq!(fields.0, bytes, "{value}");
-        }
-    }
 
     #[test]
     fn a_transform_has_the_bytes_of_its_fields() {

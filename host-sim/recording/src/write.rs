@@ -4,6 +4,7 @@
 
 use super::foxglove;
 use super::messages::{CHANNELS, Hello, Link, Pose, Probe, Samples, Setup};
+use super::protobuf::{self, Fields};
 use control_core::TICK_HZ;
 use control_core::controller::Sample;
 use device_sim::error::Error;
@@ -28,6 +29,10 @@ const MOST_OF_A_NAME: u32 = 9_999;
 const FLUSH_TICKS: u64 = TICK_HZ as u64 / 4;
 /// Ticks from one transform for Foxglove to the next: 100 a second.
 const TRANSFORM_TICKS: u64 = TICK_HZ as u64 / 100;
+/// Topic, package, name and fields of the numbers that are written with each transform: the last
+/// one is the torque at the converter then, and no number before the device has said its scale.
+const NUMBERS: (&str, &str, &str, [&str; 4]) =
+    ("/needle", "needle", "Numbers", ["depth_mm", "speed_mm_s", "force_n", "torque_mnm"]);
 const NS_PER_TICK: u64 = 1_000_000_000 / TICK_HZ as u64;
 
 /// A recording in progress.
@@ -38,6 +43,12 @@ pub struct Recorder<W: Write + Seek = BufWriter<File>> {
     channels: Vec<u16>,
     /// By the order of [`foxglove::CHANNELS`].
     drawn: Vec<u16>,
+    /// The channel of [`NUMBERS`].
+    numbers: u16,
+    /// The device's scale; none before it said it.
+    hello: Option<Hello>,
+    /// Torque of the newest sample, mN·m.
+    torque_mnm: f64,
     /// Tick of the last transform.
     drawn_at: Option<u64>,
     /// Time of tick 0, ns since 1970.
@@ -96,6 +107,9 @@ impl<W: Write + Seek> Recorder<W> {
             file,
             channels: Vec::new(),
             drawn: Vec::new(),
+            numbers: 0,
+            hello: None,
+            torque_mnm: f64::NAN,
             drawn_at: None,
             epoch_ns: u64::try_from(since_1970.as_nanos()).unwrap_or(0),
             tick: 0,
@@ -117,6 +131,13 @@ impl<W: Write + Seek> Recorder<W> {
                 .and_then(|id| recorder.writer.add_channel(id, topic, "protobuf", &BTreeMap::new()));
             recorder.drawn.push(added.map_err(|cause| recorder.lost(&cause))?);
         }
+        let (topic, package, name, fields) = NUMBERS;
+        let schema = protobuf::numbers(package, name, &fields);
+        let added = recorder
+            .writer
+            .add_schema(&format!("{package}.{name}"), "protobuf", &schema)
+            .and_then(|id| recorder.writer.add_channel(id, topic, "protobuf", &BTreeMap::new()));
+        recorder.numbers = added.map_err(|cause| recorder.lost(&cause))?;
         recorder.setup(setup)?;
         recorder.flush()?;
         Ok(recorder)
@@ -134,12 +155,19 @@ impl<W: Write + Seek> Recorder<W> {
 
     /// Writes the device's identity and scale.
     pub fn hello(&mut self, hello: &frames::Hello) -> Result<(), Error> {
-        self.put(1, &Hello::from(hello))
+        let hello = Hello::from(hello);
+        self.put(1, &hello)?;
+        self.hello = Some(hello).filter(Hello::is_plausible);
+        Ok(())
     }
 
     /// Consecutive samples.
     pub fn samples(&mut self, first_tick: u64, samples: &[Sample]) -> Result<(), Error> {
         self.tick = first_tick;
+        if let (Some(hello), Some(last)) = (&self.hello, samples.last()) {
+            // The page's sign: torque that resists insertion is negative.
+            self.torque_mnm = -hello.force_n(last.dac) * hello.roller_radius_mm;
+        }
         self.put(2, &Samples::from_block(first_tick, samples))?;
         // A device that starts anew counts from 0 again.
         if first_tick.abs_diff(self.flushed) >= FLUSH_TICKS { self.flush() } else { Ok(()) }
@@ -153,6 +181,8 @@ impl<W: Write + Seek> Recorder<W> {
             return Ok(());
         }
         self.drawn_at = Some(pose.tick);
+        let numbers = [pose.depth_mm, pose.speed_mm_s, pose.force_n, self.torque_mnm];
+        self.write(self.numbers, &Fields::default().doubles(&numbers).bytes())?;
         let tilt_rad = f64::from(pose.tilt_mrad) / 1_000.0;
         let transform = foxglove::transform(self.now_ns(), pose.depth_mm, tilt_rad);
         self.write(self.drawn[0], &transform)

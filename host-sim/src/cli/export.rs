@@ -24,6 +24,10 @@ pub(super) struct ExportOptions {
     /// The joint in THEIR.xml
     #[arg(long, value_name = "NAME", requires = "into")]
     joint: Option<String>,
+    /// With --into: also write bristles (LuGre), Stribeck friction and cogging, as motors without a
+    /// winding that MuJoCo 4.0 and newer read
+    #[arg(long, requires = "into")]
+    dcmotor: bool,
 }
 
 /// The rig's exports.
@@ -31,6 +35,7 @@ pub(super) struct Exports {
     formats: Vec<Format>,
     /// Their model, its text, and the joint in it.
     into: Option<(PathBuf, String, String)>,
+    dcmotor: bool,
 }
 
 impl ExportOptions {
@@ -50,7 +55,7 @@ impl ExportOptions {
         };
         let formats = self.export.iter().map(find).collect::<Result<Vec<_>, _>>()?;
         let (Some(path), Some(joint)) = (&self.into, &self.joint) else {
-            return Ok(Exports { formats, into: None });
+            return Ok(Exports { formats, into: None, dcmotor: false });
         };
         if !formats.contains(&Format::Mjcf) {
             return Err(Error::input("--into writes a MuJoCo model; add --export mjcf"));
@@ -59,8 +64,9 @@ impl ExportOptions {
         let text = std::fs::read_to_string(path).map_err(|cause| {
             Error::input(format_args!("{}: cannot be read ({cause}); check its path", path.display()))
         })?;
-        mjcf_patch::patch(&text, joint, nominal, nominal).map_err(|why| refused(path, &why))?;
-        Ok(Exports { formats, into: Some((path.clone(), text, joint.clone())) })
+        mjcf_patch::patch(&text, joint, nominal, nominal, self.dcmotor).map_err(|why| refused(path, &why))?;
+        let into = Some((path.clone(), text, joint.clone()));
+        Ok(Exports { formats, into, dcmotor: self.dcmotor })
     }
 }
 
@@ -80,8 +86,8 @@ impl Exports {
         for format in &self.formats {
             match &self.into {
                 Some((path, text, joint)) if *format == Format::Mjcf => {
-                    let patched =
-                        mjcf_patch::patch(text, joint, nominal, rig).map_err(|why| refused(path, &why))?;
+                    let patched = mjcf_patch::patch(text, joint, nominal, rig, self.dcmotor)
+                        .map_err(|why| refused(path, &why))?;
                     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
                     write(&path.with_file_name(format!("{stem}-patched.xml")), &patched)?;
                     if let Some(report) = report {

@@ -18,14 +18,22 @@ use std::path::PathBuf;
 #[derive(Args)]
 #[command(after_help = examples!("Examples:
   host-sim import run1.csv run2.csv --out imported
+  host-sim import --page --out imported
   host-sim import log.csv --column position=theta:deg --column command=-tau:mNm --out imported
   host-sim import angle.csv torque.csv --column position=angle.csv/value:deg --column command=torque.csv/value:Nm --out imported
   host-sim import robot.csv --axes --split 0.6 --out robot
   host-sim import log.npz --rate 1000 --split 0.6 --inertia 0.17 --gain 1 --out imported"))]
 pub(crate) struct Import {
     /// Recordings; several files of one run in chronological order, or with different columns
-    #[arg(required = true, value_name = "FILE")]
+    #[arg(required_unless_present = "page", value_name = "FILE")]
     files: Vec<PathBuf>,
+    /// Ask on a page instead, on this computer only: drop a log on it, say what its columns are
+    /// while you see them, fill in the rig, and have the report
+    #[arg(long, conflicts_with_all = ["axes", "column", "clock", "rig"])]
+    page: bool,
+    /// With --page: the port of 127.0.0.1 (0: any free one)
+    #[arg(long, default_value_t = 8712, requires = "page", value_name = "PORT")]
+    port: u16,
     /// Folder to write to; created if missing
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -143,6 +151,9 @@ impl Import {
 
     pub(crate) fn run(self) -> Result<(), Error> {
         self.check()?;
+        if self.page {
+            return super::import_page::serve(self.files, self.out, self.port);
+        }
         let columns = self.column.iter().map(|text| import::choice(text)).collect::<Result<_, _>>()?;
         let clocks = self.clock.iter().map(|text| import::clock_choice(text)).collect::<Result<_, _>>()?;
         let encodings = self.encoding.iter().map(|text| import::encoding(text)).collect::<Result<_, _>>()?;

@@ -13,6 +13,7 @@ mod experiment;
 mod export;
 mod fit_force;
 mod import;
+mod import_page;
 mod man;
 mod one_diagnosis;
 mod recordings;

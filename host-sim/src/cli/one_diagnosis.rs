@@ -20,8 +20,21 @@ pub(super) fn diagnose(request: &Request, exports: &Exports, out: &Path) -> Resu
             bar.show(100.0 * done, Some(100.0), &format!("% ({stage})"));
         }
     };
-    let mut outcome = while_showing(&bar, || diagnosis::diagnose(request, &show)).map_err(Error::input)?;
+    let outcome = while_showing(&bar, || written(request, out, &show))?;
     drop(bar);
+    say!("{}", outcome.summary().trim_end());
+    exports.write(&outcome.nominal_rig, &outcome.patched_rig, Some(&outcome.report), out)?;
+    Ok(outcome)
+}
+
+/// Diagnoses and writes the report into a folder; `progress` receives the stage and the fraction
+/// done.
+pub(super) fn written(
+    request: &Request,
+    out: &Path,
+    progress: &(dyn Fn(&str, f64) + Sync),
+) -> Result<Outcome, Error> {
+    let mut outcome = diagnosis::diagnose(request, progress).map_err(Error::input)?;
     outcome.made = Some(made(request));
     outcome.write(out).map_err(|cause| {
         Error::failed(format_args!(
@@ -29,8 +42,6 @@ pub(super) fn diagnose(request: &Request, exports: &Exports, out: &Path) -> Resu
             out.display()
         ))
     })?;
-    say!("{}", outcome.summary().trim_end());
-    exports.write(&outcome.nominal_rig, &outcome.patched_rig, Some(&outcome.report), out)?;
     Ok(outcome)
 }
 

@@ -162,7 +162,8 @@ impl Simulate {
                 self.out.display()
             ))
         })?;
-        files.iter().try_for_each(|(name, bytes)| write(&self.out.join(name), |out| out.write_all(bytes)))
+        files.iter().try_for_each(|(name, bytes)| write(&self.out.join(name), |out| out.write_all(bytes)))?;
+        recording::views::write_beside(&self.out.join("simulation.mcap"))
     }
 }
 

@@ -34,10 +34,23 @@ pub fn statements(recording: &Recording, by: Option<&Profile>, trainee: &str) ->
     Ok(statements)
 }
 
-/// Returns a time in seconds since 1970 as ISO 8601 in UTC; none beyond the year 9999.
+/// Returns a time in seconds since 1970 as ISO 8601 in UTC; none beyond the year 9999. Written here
+/// because a library of calendars and time zones is a large build for one time stamp.
 fn utc(since_1970_s: u64) -> Option<String> {
-    let stamp = jiff::Timestamp::from_second(i64::try_from(since_1970_s).ok()?).ok()?;
-    Some(stamp.to_string())
+    let (days, second) = (since_1970_s / 86_400, since_1970_s % 86_400);
+    // Days from 0000-03-01, in eras of 400 years; years begin in March, so that a leap day is the
+    // last of its year.
+    let days = days + 719_468;
+    let (era, day) = (days / 146_097, days % 146_097);
+    let year_of_era = (day - day / 1_460 + day / 36_524 - day / 146_096) / 365;
+    let day = day - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
+    let march = (5 * day + 2) / 153;
+    let day = day - (153 * march + 2) / 5 + 1;
+    let (month, later) = if march < 10 { (march + 3, 0) } else { (march - 9, 1) };
+    let year = 400 * era + year_of_era + later;
+    let (hour, minute) = (second / 3_600, second / 60 % 60);
+    (year <= 9_999)
+        .then(|| format!("{year:04}-{month:02}-{day:02}T{hour:02}:{minute:02}:{:02}Z", second % 60))
 }
 
 /// Returns a UUID that follows from a text: FNV-1a of 128 bits, marked as version 8 of RFC 9562.
@@ -150,9 +163,11 @@ mod tests {
             (951_782_400, "2000-02-29T00:00:00Z"),
             (1_798_761_599, "2026-12-31T23:59:59Z"),
             (4_107_542_400, "2100-03-01T00:00:00Z"),
+            (253_402_300_799, "9999-12-31T23:59:59Z"),
         ] {
             assert_eq!(utc(since_1970_s).as_deref(), Some(date));
         }
+        assert_eq!([253_402_300_800, u64::MAX].map(utc), [None, None]);
     }
 
     #[test]

@@ -9,6 +9,7 @@ mod editor;
 mod graphics;
 mod guide;
 mod headset;
+mod import;
 mod languages;
 mod layout;
 mod needle;

@@ -1,6 +1,6 @@
 //! The plots of a report: values under the pointer, a stretch that is dragged over shown alone with
-//! values and ticks of its own, and the whole again. The curve is a known one, so that the values
-//! can be checked.
+//! values and ticks of its own, in the plots over the same quantity too, and the whole again. The
+//! curve is a known one, so that the values can be checked.
 
 use std::fmt::Write as _;
 use std::process::Command;
@@ -15,6 +15,8 @@ fn position(t: f64) -> f64 {
 
 const COUNTS_PER_UNIT: f64 = 636.619_772_4;
 const SECONDS: f64 = 10.0;
+/// A row that reads 1 rad too much.
+const SPIKE_ROW: u32 = 4_503;
 /// The first plot, with the place of a part of its width in the window.
 const PLOT: &str = "const svg = document.querySelector('svg[data-x]'); svg.scrollIntoView({ block: 'center' }); \
                     const box = svg.getBoundingClientRect();";
@@ -32,7 +34,8 @@ fn visit() -> Result<(), Error> {
     let mut csv = String::from("time_s,command,position_counts\n");
     for row in 0..(SECONDS * 1e3) as u32 {
         let t = f64::from(row) * 1e-3;
-        let _ = writeln!(csv, "{t:.4},0,{:.0}", position(t) * COUNTS_PER_UNIT);
+        let spike = if row == SPIKE_ROW { 1.0 } else { 0.0 };
+        let _ = writeln!(csv, "{t:.4},0,{:.0}", (position(t) + spike) * COUNTS_PER_UNIT);
     }
     let recording = scratch.join("recording.csv");
     std::fs::write(&recording, csv).map_err(|error| error.to_string())?;
@@ -62,6 +65,18 @@ fn visit() -> Result<(), Error> {
     for part in [0.3, 0.5, 0.8] {
         check("the readout of the stretch", reads(&mut page, part)?, said(&mut page)?)?;
     }
+    let (first, second) = (labels_of(&mut page, 0)?, labels_of(&mut page, 1)?);
+    check("the plot below shows the same stretch", first == second, format!("{first}; {second}"))?;
+    let both = page.text("[...document.querySelectorAll('output')].slice(0, 2).map((one) => one.textContent.split(' · ')[0]).join('; ')")?;
+    let times: Vec<&str> = both.split("; ").collect();
+    check("the plot below points at the same time", times.len() == 2 && times[0] == times[1], &both)?;
+    // A row is 0.054 of the drawing's units wide; recorded is the last curve.
+    let seen = page.number(
+        "(() => { const all = document.querySelector('svg[data-x]').querySelectorAll('path[data-name]'); \
+         const ys = [...all].at(-1).getAttribute('d').split(/[ML]/).filter(Boolean).map((part) => Number(part.split(' ')[1])); \
+         return ys.filter((y, i) => i > 0 && i < ys.length - 1 && Math.abs(2 * y - ys[i - 1] - ys[i + 1]) > 15).length; })()",
+    )?;
+    check("one row among ten thousand is in the picture", seen >= 1.0, seen)?;
     page.photograph(&scratch.join("stretch.png"))?;
     page.evaluate(
         "document.querySelector('svg[data-x]').dispatchEvent(new MouseEvent('dblclick', { bubbles: true }))",
@@ -96,10 +111,14 @@ fn reads(page: &mut Page, part: f64) -> Result<bool, Error> {
     Ok((recorded - position(time)).abs() < 0.1)
 }
 
-/// Labels of the ticks along the first plot that are shown.
 fn labels(page: &mut Page) -> Result<String, Error> {
-    page.text(
-        "[...document.querySelector('svg[data-x]').querySelectorAll('text:not([text-anchor=end])')]\
-         .filter((text) => text.style.display !== 'none').map((text) => text.textContent).join(' ')",
-    )
+    labels_of(page, 0)
+}
+
+/// Labels of the ticks along a plot that are shown.
+fn labels_of(page: &mut Page, plot: usize) -> Result<String, Error> {
+    page.text(&format!(
+        "[...document.querySelectorAll('svg[data-x]')[{plot}].querySelectorAll('text:not([text-anchor=end])')]\
+         .filter((text) => text.style.display !== 'none').map((text) => text.textContent).join(' ')"
+    ))
 }

@@ -20,8 +20,8 @@ const BELOW: [(&str, &[&str]); 7] = [
 /// Crates that use what their room may not, and why.
 const EXCEPTIONS: [(&str, &[&str], &str); 1] = [(
     "diagnosis/python",
-    &["convert", "same-features"],
-    "a program of its own, which nothing else uses: `import_recording` is `host-sim import`",
+    &["convert", "lab", "same-features"],
+    "a program of its own, which nothing else uses: its `import_recording` and `settle` are those of `host-sim`",
 )];
 /// All that the judge takes of the diagnosis: the call, as a user makes it, and the reader that
 /// says whether a rig written by the judge is one.

@@ -25,7 +25,10 @@ import pandas as _pandas
 from . import _native
 from ._native import InputError
 
-__all__ = ["Effect", "Imported", "InputError", "Report", "check", "diagnose", "import_recording", "simulate"]
+__all__ = [
+    "Effect", "Experiment", "Imported", "InputError", "Report", "Settled",
+    "check", "diagnose", "experiment", "import_recording", "settle", "simulate",
+]
 
 
 @_dataclass(frozen=True)
@@ -83,15 +86,33 @@ class Imported:
     notes: list
 
 
-def _rig(rig):
+@_dataclass(frozen=True)
+class Experiment:
+    """The input that experiment designed: a summary, and its files, of which reference.csv and command.csv are to be played."""
+
+    summary: str
+    files: list
+
+
+@_dataclass(frozen=True)
+class Settled:
+    """What settle found: each name that is sure enough with those that cannot be distinguished from it and its probability, why it ended, and the
+    folder with its pages."""
+
+    names: list
+    conclusion: str
+    folder: _Path
+
+
+def _rig(rig, what="rig"):
     """A rig's name and text, from a path or from TOML."""
     if isinstance(rig, str) and "\n" in rig:
-        return ("rig", rig)
+        return (what, rig)
     path = _Path(rig)
     try:
         return (str(path), path.read_text(encoding="utf-8"))
     except OSError as cause:
-        raise InputError(f"{path}: the rig cannot be read ({cause.strerror}); check its path") from cause
+        raise InputError(f"{path}: the {what} cannot be read ({cause.strerror}); check its path") from cause
 
 
 def _recording(recording, name):
@@ -118,12 +139,43 @@ def check(rig, fit, holdout):
     return _native.check(_rig(rig), _recordings(fit, "fit"), _recordings(holdout, "holdout"))
 
 
-def diagnose(rig, fit, holdout):
+def diagnose(rig, fit, holdout, effects=None, progress=None):
     """Diagnoses recordings of a rig.
 
-    rig: a path, or TOML. fit, holdout: one recording or several; those to hold out only judge. Raises InputError, with a sentence that
-    says what, where and what to do."""
-    return Report(_native.diagnose(_rig(rig), _recordings(fit, "fit"), _recordings(holdout, "holdout")))
+    rig: a path, or TOML. fit, holdout: one recording or several; those to hold out only judge. effects: a file of formulas that are
+    searched too, a path or TOML. progress: called with a stage and the fraction done, 0 to 1; what it raises is raised at the end.
+    Raises InputError, with a sentence that says what, where and what to do."""
+    formulas = None if effects is None else _rig(effects, "file of effects")
+    return Report(_native.diagnose(_rig(rig), _recordings(fit, "fit"), _recordings(holdout, "holdout"), formulas, progress))
+
+
+def experiment(report, out, travel=None, speed=None, force=None, seconds=30.0, seed=1):
+    """Designs the input that best distinguishes the rivals of a diagnosis, and writes it to the folder out, as host-sim experiment does.
+
+    report: a Report, or the folder that one was saved to. travel, speed, force: limits in rad or m, a second, and N·m or N; without them
+    what the recordings did and the rig allows. seconds: the longest input, 4 to 30."""
+    if not 4.0 <= seconds <= 30.0:
+        raise InputError(f"seconds is {seconds}; it must be from 4 to 30")
+    if isinstance(report, Report):
+        report.save(_Path(out) / "report")
+        report = _Path(out) / "report"
+    limits = (travel, speed, force)
+    summary, files = _native.experiment(_os.fspath(report), _os.fspath(out), limits, seconds, seed)
+    return Experiment(summary, [_Path(one) for one in files])
+
+
+def settle(plant, out, rig=None, rounds=5, motion=180.0, seed=1, compensate=True, progress=None):
+    """Lets a virtual device settle its own diagnosis: it records, diagnoses, designs the deciding input and records again, as host-sim
+    settle does; a real device moves beside a person, on the command line only.
+
+    plant: the device's true mechanism, a path or TOML. rig: the simulation as its author believes it. rounds: at most, 1 to 5. motion:
+    at most, 20 to 180 s. compensate: feed forward what was found. progress: called with words and the fraction done."""
+    if not 1 <= rounds <= 5 or not 20.0 <= motion <= 180.0:
+        raise InputError(f"rounds is {rounds} and motion {motion}; they must be 1 to 5, and 20 to 180 s")
+    believed = None if rig is None else _rig(rig)
+    limits = (rounds, motion, seed, compensate)
+    names, conclusion = _native.settle(_rig(plant, "plant"), believed, _os.fspath(out), limits, progress)
+    return Settled(names, conclusion, _Path(out))
 
 
 def simulate(rig, recording):

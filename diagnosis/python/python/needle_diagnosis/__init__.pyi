@@ -1,4 +1,4 @@
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -8,6 +8,7 @@ import pandas as pd
 
 Recording = Union[str, PathLike[str], pd.DataFrame, Mapping[str, Any]]
 Recordings = Union[Recording, Iterable[Recording]]
+Progress = Union[Callable[[str, float], object], None]
 
 class InputError(ValueError): ...
 
@@ -35,8 +36,44 @@ class Imported:
     recordings: list[Path]
     notes: list[str]
 
+@dataclass(frozen=True)
+class Experiment:
+    summary: str
+    files: list[Path]
+
+@dataclass(frozen=True)
+class Settled:
+    names: list[tuple[list[str], float]]
+    conclusion: str
+    folder: Path
+
 def check(rig: Union[str, PathLike[str]], fit: Recordings, holdout: Recordings) -> list[str]: ...
-def diagnose(rig: Union[str, PathLike[str]], fit: Recordings, holdout: Recordings) -> Report: ...
+def diagnose(
+    rig: Union[str, PathLike[str]],
+    fit: Recordings,
+    holdout: Recordings,
+    effects: Union[str, PathLike[str], None] = ...,
+    progress: Progress = ...,
+) -> Report: ...
+def experiment(
+    report: Union[Report, str, PathLike[str]],
+    out: Union[str, PathLike[str]],
+    travel: Union[float, None] = ...,
+    speed: Union[float, None] = ...,
+    force: Union[float, None] = ...,
+    seconds: float = ...,
+    seed: int = ...,
+) -> Experiment: ...
+def settle(
+    plant: Union[str, PathLike[str]],
+    out: Union[str, PathLike[str]],
+    rig: Union[str, PathLike[str], None] = ...,
+    rounds: int = ...,
+    motion: float = ...,
+    seed: int = ...,
+    compensate: bool = ...,
+    progress: Progress = ...,
+) -> Settled: ...
 def simulate(rig: Union[str, PathLike[str]], recording: Recording) -> pd.DataFrame: ...
 def import_recording(
     *files: Union[str, PathLike[str]],

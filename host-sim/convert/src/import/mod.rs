@@ -40,6 +40,7 @@ mod writer;
 
 pub use encodings::{RoleEncoding, encoding};
 pub use numbers::Decimal;
+pub use role::Role;
 pub use roles::{Choice, choice, clock_choice};
 pub use rows::Known;
 pub use runs::Keep;
@@ -48,6 +49,7 @@ pub use writer::RigValues;
 use device_sim::error::Error;
 use diagnosis::rig::{Kind, Rig};
 use gather::Said;
+use numerics::digits::in_sentence;
 use rows::Rows;
 use std::f64::consts::TAU;
 use std::path::PathBuf;
@@ -119,6 +121,37 @@ struct Ready {
     recordings: Vec<(String, Rows)>,
     scale: encoder_resolution::Scale,
     notes: Vec<String>,
+}
+
+/// A column of a file, as it is before it has a role.
+#[derive(Clone, Debug)]
+pub struct Seen {
+    /// The file.
+    pub file: String,
+    /// Its name there.
+    pub name: String,
+    /// Its unit in the contract's, where the file says it: `0.01745 rad`.
+    pub unit: Option<String>,
+    /// The role that its name and unit suggest.
+    pub role: Option<Role>,
+    /// One a row; not a number where the file has none.
+    pub values: Vec<f64>,
+}
+
+/// Reads files and returns their columns, in their order.
+pub fn look(files: &[PathBuf]) -> Result<Vec<Seen>, Error> {
+    let (logs, _) = read(&Request { files: files.to_vec(), ..Request::default() })?;
+    let seen = |log: Log| {
+        let columns = log.tables.into_iter().flat_map(|table| table.columns);
+        columns.map(move |column| Seen {
+            file: log.file.clone(),
+            unit: column.unit.map(|unit| format!("{} {}", in_sentence(unit.factor), unit.quantity.unit())),
+            role: suggestion::suggested(&column).map(|(role, _)| role),
+            name: column.name,
+            values: column.values,
+        })
+    };
+    Ok(logs.into_iter().flat_map(seen).collect())
 }
 
 /// Reads, cleans and writes.

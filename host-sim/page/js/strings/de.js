@@ -193,14 +193,15 @@ export default {
   "tissue.gluteus": "Gesäßmuskel",
   "tissue.layer": "Schicht",
   // Plots.
-  "plot.time": "Tiefe und Kraft über der Zeit",
+  "plot.time": "Tiefe, Kraft und Moment",
   "plot.computed": "berechnet",
   "plot.motor": "Motor",
-  "plot.time_label": "Tiefe in mm und Kraft in N während der letzten zehn Sekunden",
+  "plot.time_label": "Tiefe in mm, Kraft in N und Moment in mN·m während der letzten zehn Sekunden",
   "plot.phase": "Kraft über der Tiefe",
   "plot.phase_label": "Kraft in N über der Tiefe in mm während der letzten zehn Sekunden",
   "plot.depth": "Tiefe, mm",
   "plot.force": "Kraft, N",
+  "plot.torque": "Moment, mN·m",
   "plot.now": "jetzt",
   // Events.
   "event.title": "Ereignisse",

@@ -193,14 +193,15 @@ export default {
   "tissue.gluteus": "gluteus",
   "tissue.layer": "layer",
   // Plots.
-  "plot.time": "Depth and force against time",
+  "plot.time": "Depth, force and torque",
   "plot.computed": "computed",
   "plot.motor": "motor",
-  "plot.time_label": "Depth in mm and force in N over the last ten seconds",
+  "plot.time_label": "Depth in mm, force in N and torque in mN·m over the last ten seconds",
   "plot.phase": "Force against depth",
   "plot.phase_label": "Force in N against depth in mm over the last ten seconds",
   "plot.depth": "Depth, mm",
   "plot.force": "Force, N",
+  "plot.torque": "Torque, mN·m",
   "plot.now": "now",
   // Events.
   "event.title": "Events",

@@ -193,14 +193,15 @@ export default {
   "tissue.gluteus": "muscle fessier",
   "tissue.layer": "couche",
   // Plots.
-  "plot.time": "Profondeur et force selon le temps",
+  "plot.time": "Profondeur, force et couple",
   "plot.computed": "calculée",
   "plot.motor": "moteur",
-  "plot.time_label": "Profondeur en mm et force en N sur les dix dernières secondes",
+  "plot.time_label": "Profondeur en mm, force en N et couple en mN·m sur les dix dernières secondes",
   "plot.phase": "Force selon la profondeur",
   "plot.phase_label": "Force en N selon la profondeur en mm sur les dix dernières secondes",
   "plot.depth": "Prof., mm",
   "plot.force": "Force, N",
+  "plot.torque": "Couple, mN·m",
   "plot.now": "maint.",
   // Events.
   "event.title": "Événements",

@@ -26,6 +26,8 @@ pub(super) const DEVICE_PAGE: Asset = asset!("/", "index.html", PAGE);
 pub(super) const CLASS_PAGE: Asset = asset!("/", "class.html", PAGE);
 /// The page of a guide.
 pub(super) const GUIDE_PAGE: Asset = asset!("/", "guide.html", PAGE);
+/// The page to drop a log on.
+pub(super) const IMPORT_PAGE: Asset = asset!("/", "import.html", PAGE);
 
 /// The files of the pages.
 pub(super) const ASSETS: &[Asset] = &[
@@ -37,6 +39,8 @@ pub(super) const ASSETS: &[Asset] = &[
     asset!("/guide.css", "guide.css", "text/css; charset=utf-8"),
     asset!("/guide.js", "guide.js", SCRIPT),
     asset!("/guide_steps.js", "guide_steps.js", SCRIPT),
+    asset!("/import.css", "import.css", "text/css; charset=utf-8"),
+    asset!("/import.js", "import.js", SCRIPT),
     asset!("/icon.svg", "icon.svg", "image/svg+xml"),
     asset!("/main.js", "main.js", SCRIPT),
     asset!("/language.js", "language.js", SCRIPT),

@@ -12,6 +12,8 @@ use axum::response::{IntoResponse, Redirect, Response};
 use axum::serve::IncomingStream;
 use std::net::SocketAddr;
 
+/// The address of a workbench's answers.
+pub(super) const WORKBENCH: &str = "/import/";
 /// Name of the token, in the address and in the cookie.
 const TOKEN: &str = "token";
 
@@ -69,7 +71,9 @@ pub(super) async fn pass(
     if peer.ip().is_loopback() {
         // Anybody on this computer may ask for what only shows a page. Only the page itself may ask
         // for what moves or reveals something.
-        let is_free = !matches!(request.uri().path(), "/live" | "/debrief" | demonstration::PATH);
+        let path = request.uri().path();
+        let is_free =
+            !matches!(path, "/live" | "/debrief" | demonstration::PATH) && !path.starts_with(WORKBENCH);
         return match is_free || is_own_page(headers, true) {
             true => next.run(request).await,
             false => refuse("only the page of this program may do this"),

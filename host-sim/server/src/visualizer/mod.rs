@@ -4,8 +4,8 @@
 //! [`device_sim::page::messages`] is what is said between server and page,
 //! [`device_sim::page::condense`] turns 10 kHz into what a picture needs, `server` and `connection`
 //! carry it, `watched` carries a page that only looks (a class) or agrees to steps (a guide),
-//! `debrief` serves what it is given for the last recording, `assets` holds the files of
-//! `host-sim/page/js`.
+//! `debrief` serves what it is given for the last recording, `workbench` passes files and questions
+//! on, `assets` holds the files of `host-sim/page/js`.
 //!
 //! This module may not touch the device, the link or a recording: it knows a
 //! [`device_sim::session::Session`] and nothing behind it. A page that is slow, asleep or gone
@@ -19,11 +19,15 @@ mod gate;
 mod server;
 mod shared;
 mod watched;
+mod workbench;
 
 pub use debrief::Debrief;
 pub use demonstration::Demonstration;
-pub use server::{ServeError, Server, serve, serve_guide, serve_watched, serve_with_reports};
+pub use server::{
+    ServeError, Server, serve, serve_guide, serve_watched, serve_with_reports, serve_workbench,
+};
 pub use watched::{Said, Watch, Watches};
+pub use workbench::Workbench;
 
 #[cfg(test)]
 pub(crate) fn test_scene() -> device_sim::session::Scene {

@@ -1,12 +1,13 @@
 //! Serves the page: on this computer only, or to a network and with a token.
 
-use super::assets::{ASSETS, Asset, CLASS_PAGE, DEVICE_PAGE, GUIDE_PAGE};
+use super::assets::{ASSETS, Asset, CLASS_PAGE, DEVICE_PAGE, GUIDE_PAGE, IMPORT_PAGE};
 use super::connection;
 use super::debrief::{self, Debrief};
 use super::demonstration::{self, Demonstration};
 use super::gate::{self, Gate, Peer};
 use super::shared::Shared;
 use super::watched::{self, Said, Watched, Watches};
+use super::workbench::{self, Workbench};
 use crate::bounded_listener::BoundedListener;
 use axum::Router;
 use axum::extract::{State, WebSocketUpgrade};
@@ -182,6 +183,11 @@ pub fn serve_watched(watches: Watches, port: u16) -> Result<Server, ServeError> 
 pub fn serve_guide(watches: Watches, said: Said, port: u16) -> Result<Server, ServeError> {
     let live = get(watched::live).with_state(Watched { watches, said: Some(said) });
     start(local(port), &GUIDE_PAGE, Router::new().route("/live", live))
+}
+
+/// Serves the page to drop a log on, whose questions `answer` answers, as [`serve`] does.
+pub fn serve_workbench(answer: Workbench, port: u16) -> Result<Server, ServeError> {
+    start(local(port), &IMPORT_PAGE, workbench::router(answer))
 }
 
 fn start(wanted: SocketAddr, page: &'static Asset, router: Router) -> Result<Server, ServeError> {
