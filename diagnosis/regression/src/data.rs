@@ -28,8 +28,11 @@ pub struct Rig {
     pub has_offset: bool,
     /// k, N·m or N per unit of command.
     pub gain: Value,
-    /// Delay, lag of the drive and filter of the reading that are already known, together, s.
+    /// Delay that is already known, s.
     pub known_delay_s: f64,
+    /// Time constants of first-order lags that are already known, of the drive and of the reading's
+    /// filter, s.
+    pub known_lags_s: Vec<f64>,
     /// Counts per rad or per m.
     pub counts_per_unit: f64,
     /// True if counts have the same zero in every recording.

@@ -56,6 +56,22 @@ pub(crate) fn low_pass(x: &[f64], rate_hz: f64, corner_hz: f64, order: usize) ->
     y[pad..pad + n].to_vec()
 }
 
+/// Returns `x` behind a first-order lag, exact for straight pieces; it starts settled.
+pub(crate) fn first_order(x: &[f64], h: f64, lag_s: f64) -> Vec<f64> {
+    if lag_s <= 0.0 {
+        return x.to_vec();
+    }
+    let keep = (-h / lag_s).exp();
+    let slope = (1.0 - keep) * lag_s / h;
+    let mut last = (x[0], x[0]);
+    let next = |x: &f64| {
+        let y = keep * last.1 + (1.0 - slope) * x + (slope - keep) * last.0;
+        last = (*x, y);
+        y
+    };
+    x.iter().map(next).collect()
+}
+
 /// Returns the derivative by differences of fourth order, lower at the ends.
 pub(crate) fn derivative(x: &[f64], h: f64) -> Vec<f64> {
     let n = x.len();
@@ -109,4 +125,18 @@ pub(crate) fn quantile(x: impl IntoIterator<Item = f64>, p: f64) -> f64 {
     }
     let k = ((x.len() - 1) as f64 * p).round() as usize;
     *x.select_nth_unstable_by(k, f64::total_cmp).1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_lag_follows_a_ramp_by_its_time_constant() {
+        let (h, lag) = (0.01_f64, 0.03_f64);
+        let ramp: Vec<f64> = (0..20).map(|i| f64::from(i) * h).collect();
+        for (t, y) in ramp.iter().zip(first_order(&ramp, h, lag)) {
+            assert!((y - (t - lag + lag * (-t / lag).exp())).abs() < 1e-12, "{y} at {t}");
+        }
+    }
 }

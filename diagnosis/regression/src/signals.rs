@@ -4,7 +4,7 @@ use crate::constants::{
     MASK_S, REST, REST_ERRORS, SPEED_BAND, SPEED_BAND_HZ, SPEED_ERROR, SPEED_FORCED_HZ, SPEED_WIDEST,
 };
 use crate::data::{Recording, Rig};
-use crate::filters::{derivative, low_pass, quantile};
+use crate::filters::{derivative, first_order, low_pass, quantile};
 use crate::grid;
 use std::f64::consts::TAU;
 
@@ -54,7 +54,8 @@ impl Signals {
         let q_raw = grid::cubic(&stamps, &readings, &at);
         let late: Vec<f64> = stamps.iter().map(|t| t + rig.known_delay_s).collect();
         let force: Vec<f64> = grid::mean_under_hat(&late, &recording.command, &at, h);
-        let force = force.iter().map(|u| rig.gain.nominal * u).collect();
+        let force: Vec<f64> = force.iter().map(|u| rig.gain.nominal * u).collect();
+        let force: Vec<f64> = rig.known_lags_s.iter().fold(force, |force, lag| first_order(&force, h, *lag));
         let narrowest_hz = (SPEED_BAND * rate_hz).max(SPEED_BAND_HZ);
         let rough = derivative(&low_pass(&q_raw, rate_hz, narrowest_hz, 2), h);
         let fast = quantile(rough.iter().map(|v| v.abs()), 0.95) + 1e-30;

@@ -85,6 +85,7 @@ fn rig() -> Rig {
         has_offset: true,
         gain: value(GAIN, 0.05),
         known_delay_s: 0.0,
+        known_lags_s: Vec::new(),
         counts_per_unit: COUNTS,
         absolute: false,
         noise_counts: 0.0,

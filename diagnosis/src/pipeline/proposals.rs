@@ -52,7 +52,6 @@ fn plain(r: &Recording, part: Part) -> regression::Recording {
 fn nominal(rig: &Rig, late_s: f64) -> regression::Rig {
     let (model, encoder, spread) = (&rig.model, &rig.encoder, &rig.uncertainty);
     let value = |nominal: f64, spread: Option<f64>| Value { nominal, spread };
-    let known = [rig.actuator.delay_s, rig.actuator.lag_s, encoder.filter_s];
     regression::Rig {
         rotary: rig.kind == Kind::Rotary,
         inertia: value(model.inertia, spread.inertia),
@@ -62,7 +61,8 @@ fn nominal(rig: &Rig, late_s: f64) -> regression::Rig {
         gravity: model.gravity.map(|x| (value(x, spread.gravity), model.gravity_zero.unwrap_or(0.0))),
         has_offset: model.offset.is_some(),
         gain: value(rig.actuator.gain, spread.gain),
-        known_delay_s: known.into_iter().flatten().sum::<f64>() + late_s,
+        known_delay_s: rig.actuator.delay_s.unwrap_or(0.0) + late_s,
+        known_lags_s: rig.actuator.lag_s.into_iter().chain(encoder.filter_s).collect(),
         counts_per_unit: encoder.counts_per_unit,
         absolute: encoder.absolute,
         noise_counts: encoder.noise_counts.unwrap_or(0.0),

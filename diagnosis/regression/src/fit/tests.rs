@@ -15,6 +15,7 @@ fn problem() -> Problem {
         has_offset: true,
         gain: value(1.0),
         known_delay_s: 0.0,
+        known_lags_s: Vec::new(),
         counts_per_unit: 1e4,
         absolute: true,
         noise_counts: 0.0,

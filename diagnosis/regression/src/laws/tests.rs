@@ -38,6 +38,7 @@ fn machine(q: impl Fn(f64) -> f64, asked: impl Fn(f64) -> f64) -> Machine {
         has_offset: true,
         gain: value(1.0),
         known_delay_s: 0.0,
+        known_lags_s: Vec::new(),
         counts_per_unit: 1e6,
         absolute: true,
         noise_counts: 0.0,
