@@ -43,7 +43,7 @@ pub(crate) fn by_regression(prepared: &Prepared, found: &Found, rounds: &[Vec<Hy
         material.class = class_of(material.name, twins, material.class);
         materials.push(material);
     }
-    (!materials.is_empty()).then(|| standing(prepared, found, model, materials))
+    (!materials.is_empty()).then(|| standing(prepared, found, context.with_shapes_in_band(model), materials))
 }
 
 /// A model with one more effect, in the shape that fits best; none where the filter cannot see it.

@@ -1,6 +1,7 @@
 //! The candidate effects, the best shape of each, and the comparison of models on the fitted
 //! recordings. Nothing here sees a held-out recording.
 
+pub(crate) mod band_shapes;
 pub(crate) mod candidates;
 pub(crate) mod comb;
 pub(crate) mod context;
