@@ -167,8 +167,7 @@ shape = {{ from = 0.3 }}
 coefficients = {{ stiffness = 0.4 }}
 """
 
-# The law of a gap is that of both masses, 1 / inertia and dry friction / inertia of the whole.
-GAP = """format = 1
+ELBOW = """format = 1
 name = "elbow"
 kind = "rotary"
 [model]
@@ -181,27 +180,17 @@ command_unit = "A"
 [encoder]
 counts_per_unit = 1e5
 [[effect]]
-name = "backlash"
+"""
+
+# The law of a gap is that of both masses, 1 / inertia and dry friction / inertia of the whole.
+GAP = ELBOW + """name = "backlash"
 shape = {{ gap = 0.01, contact_hz = 60.0, ratio = 5.0, coast = {coast:.9e}, dry = {dry:.9e}, viscous = {damping:.9e}, per_command = {force:.9e} }}
 coefficients = {{ inertia_ratio = 5.0 }}
 """
 
 
 # Bristles that bend before they slide, friction that falls with speed, and cogging: a `dcmotor` without a winding.
-LUGRE = """format = 1
-name = "elbow"
-kind = "rotary"
-[model]
-inertia = {inertia:.9e}
-viscous = 0.3
-coulomb = 0.15
-[actuator]
-gain = 5.0
-command_unit = "A"
-[encoder]
-counts_per_unit = 1e5
-[[effect]]
-name = "{name}"
+LUGRE = ELBOW + """name = "{name}"
 shape = {{ {shape} }}
 coefficients = {{ {coefficients} }}
 """
