@@ -41,10 +41,10 @@ const HELP: &str = "\
 The project's chores.
 
   cargo xtask test [STEP…]      everything that passes or fails, setup included; or only the steps named:
-                                fmt words arrows clippy firmware unit doc board wasm site browser clients fuzz
+                                fmt words arrows clippy unit firmware board wasm site browser clients fuzz
                                 prove
   cargo xtask test --quick      the inner loop: format, words, arrows, warnings, the tests inside the crates; three minutes
-  cargo xtask nightly [WHAT…]   what takes longer than the tests may: slow parquet csharp foxglove class counts soak
+  cargo xtask nightly [WHAT…]   what takes longer than the tests may: slow doc parquet csharp foxglove class counts soak
                                 answers mutants proof
   cargo xtask firmware          builds the flash image; prints its path, flash, RAM and worst stack use
   cargo xtask flash [--dfu]     flashes it with probe-rs; --dfu: over USB, without a probe
@@ -75,6 +75,9 @@ fn main() -> ExitCode {
         Some((command, rest)) => (command.as_str(), rest),
         None => ("help", &[][..]),
     };
+    if workspace_build::is_compiler(command) {
+        return workspace_build::compile(&arguments);
+    }
     let asks_for_help = rest.iter().any(|argument| argument == "--help" || argument == "-h");
     let done = match command {
         "help" | "--help" | "-h" => help(),

@@ -14,7 +14,7 @@ use std::sync::{Mutex, PoisonError};
 use std::thread::{self, JoinHandle};
 
 /// The time for which damaged frames are parsed, in s.
-const FUZZ_SECONDS: &str = "10";
+const FUZZ_SECONDS: &str = "3";
 const LONG_FUZZ_SECONDS: &str = "600";
 
 /// A check: its name, what it shows, and what it does.
@@ -28,7 +28,7 @@ pub(crate) struct TestStep {
 }
 
 /// In the order that finds the most for the least time.
-pub(crate) const STEPS: [TestStep; 14] = [
+pub(crate) const STEPS: [TestStep; 13] = [
     step("fmt", "the sources are formatted", 3.0, fmt),
     step("words", "comments and documents are in plain English", 2.0, text),
     step(
@@ -45,13 +45,12 @@ pub(crate) const STEPS: [TestStep; 14] = [
     ),
     step("unit", "the crates' tests", 200.0, unit),
     step("firmware", "the boards' flash images build, without warnings, and fit", 60.0, image),
-    step("doc", "the documentation builds without warnings", 40.0, doc),
     step("board", "the flash images on the emulated boards", 270.0, board),
     step("wasm", "the page's WebAssembly is built from its sources", 6.0, page_wasm),
     step("site", "the device in a browser gives the same bits as host-sim's", 40.0, same_bits),
     step("browser", "the page in a real browser", 130.0, browser),
     step("clients", "streams, rigs and laws as other people's programs and Python see them", 50.0, clients),
-    step("fuzz", "the frame parser, on damaged frames", 12.0, fuzz),
+    step("fuzz", "the frame parser, on damaged frames", 3.0, fuzz),
     step("prove", "the small proof of the diagnosis", 130.0, prove),
 ];
 
@@ -70,8 +69,9 @@ pub(crate) const QUICK: [TestStep; 5] = [
 ];
 
 /// The checks that take longer than the tests may.
-pub(crate) const NIGHTLY: [TestStep; 10] = [
+pub(crate) const NIGHTLY: [TestStep; 11] = [
     step("slow", "the tests that take longest, marked `nightly`, and examples in documents", 700.0, slow),
+    step("doc", "the documentation builds without warnings", 60.0, doc),
     step(
         "parquet",
         "import reads Parquet and ROS 2 bags, which the default build leaves out",
@@ -237,7 +237,8 @@ fn browser() -> Result<(), Error> {
     setup::browser()?;
     setup::node_packages(&IN_PAGES)?;
     site::build()?;
-    shell::run(tests().args(["--test", "page"]))
+    // In one process: its tests share a browser.
+    shell::run(cargo().args(["test", "--no-fail-fast", "--quiet"]).args(BUILD).args(["--test", "page"]))
 }
 
 /// Libraries of other people, each at the version that the check was written against.
@@ -369,8 +370,7 @@ fn has_nextest() -> bool {
 fn tests() -> Command {
     let mut command = cargo();
     if has_nextest() {
-        command.args(["nextest", "run", "--config-file", "tests/nextest.toml"]);
-        command.args(["--no-fail-fast", "--status-level", "fail"]);
+        command.args(["nextest", "run", "--no-fail-fast", "--status-level", "fail"]);
     } else {
         command.args(["test", "--no-fail-fast", "--quiet"]);
     }

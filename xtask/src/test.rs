@@ -41,7 +41,7 @@ pub(crate) fn run(arguments: &[String]) -> Result<(), Error> {
         // SAFETY: no other thread runs yet.
         #[allow(unsafe_code, reason = "the environment of this process is changed once, before any thread")]
         unsafe {
-            compile_by_clippy();
+            compile_by_clippy()?;
         }
     }
     let mut summary = Summary::new();

@@ -6,7 +6,7 @@ use diagnosis::laws::EffectName;
 use diagnosis::recording::Recording;
 use diagnosis::rig::Rig;
 use diagnosis::{Outcome, Request, Verdict, diagnose};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// The folder of recordings.
 fn recorded(name: &str) -> PathBuf {
@@ -19,7 +19,7 @@ fn recorded(name: &str) -> PathBuf {
     path
 }
 
-fn run(dir: &std::path::Path, fit: &[&str], held: &[&str]) -> Outcome {
+fn run(dir: &Path, fit: &[&str], held: &[&str]) -> Outcome {
     let list = |names: &[&str]| names.iter().map(|name| dir.join(name)).collect();
     let request = Request { rig: dir.join("rig.toml"), fit: list(fit), holdout: list(held), effects: None };
     diagnose(&request, &|_, _| ()).expect("the recordings are usable")
@@ -36,27 +36,35 @@ fn held_error(outcome: &Outcome) -> f64 {
 
 #[test]
 fn emps_names_dry_friction_then_direction() {
-    let dir = recorded("emps");
-    for (fit, held) in [("train.csv", "pulses.csv"), ("pulses.csv", "train.csv")] {
-        let outcome = run(&dir, &[fit], &[held]);
-        println!("{}", outcome.summary());
-        assert_eq!(outcome.report.verdict, Verdict::MissingPhysics);
-        let names = names(&outcome);
-        assert_eq!(names[0], EffectName::CoulombFriction);
-        assert_eq!(names[1], EffectName::AsymmetricFriction);
-        assert!(held_error(&outcome) <= 5.4, "force error {:.2} %", held_error(&outcome));
-        // Published: 20.39 N; and (166.7 − 240.4)/(166.7 + 240.4) = −0.181.
-        let coulomb = outcome.report.effects[0].parameters["coulomb"].value;
-        assert!((19.5..21.5).contains(&coulomb), "{coulomb} N");
-        let asymmetry = outcome.report.effects[1].parameters["viscous_asymmetry"].value;
-        assert!((-0.21..-0.15).contains(&asymmetry), "{asymmetry}");
-        assert!(outcome.report.unexplained_fraction > 0.005, "something remains and must be said");
-    }
+    dry_friction_then_direction(&recorded("emps"), "train.csv", "pulses.csv");
+}
+
+#[test]
+#[ignore = "nightly: 8 s"]
+fn emps_names_the_same_with_its_recordings_swapped() {
+    dry_friction_then_direction(&recorded("emps"), "pulses.csv", "train.csv");
+}
+
+fn dry_friction_then_direction(emps: &Path, fit: &str, held: &str) {
+    let outcome = run(emps, &[fit], &[held]);
+    println!("{}", outcome.summary());
+    assert_eq!(outcome.report.verdict, Verdict::MissingPhysics);
+    let names = names(&outcome);
+    assert_eq!(names[0], EffectName::CoulombFriction);
+    assert_eq!(names[1], EffectName::AsymmetricFriction);
+    assert!(held_error(&outcome) <= 5.4, "force error {:.2} %", held_error(&outcome));
+    // Published: 20.39 N; and (166.7 − 240.4)/(166.7 + 240.4) = −0.181.
+    let coulomb = outcome.report.effects[0].parameters["coulomb"].value;
+    assert!((19.5..21.5).contains(&coulomb), "{coulomb} N");
+    let asymmetry = outcome.report.effects[1].parameters["viscous_asymmetry"].value;
+    assert!((-0.21..-0.15).contains(&asymmetry), "{asymmetry}");
+    assert!(outcome.report.unexplained_fraction > 0.005, "something remains and must be said");
 }
 
 /// The ripple of the ball screw is there (it gains hundreds of nats on the held-out recording) but
 /// takes less than 5 % off the force error.
 #[test]
+#[ignore = "nightly: 8 s"]
 fn emps_ripple_is_seen_but_not_material() {
     let dir = recorded("emps");
     let mut rig = Rig::read(&dir.join("rig.toml")).expect("the rig is usable");

@@ -77,6 +77,19 @@ fn strong_effects_are_named_with_their_values() {
             ((value - truth) / truth).abs() < tolerance,
             "{effect}: {parameter} {value} instead of {truth}"
         );
+        // Friction that drifts brakes either way, so that it shows in the direction of motion only,
+        // and how much depends on how a recording moves; a deadband has no coefficient, only a
+        // shape.
+        match effect {
+            "cogging" => {
+                the_decisive_law_goes_through_held_out_points(&outcome, "angle", false);
+                files_are_written_whole_and_the_patched_rig_reads_back(&outcome);
+            }
+            "quadratic_drag" => the_decisive_law_goes_through_held_out_points(&outcome, "speed", false),
+            "friction_drift" => the_decisive_law_goes_through_held_out_points(&outcome, "time", true),
+            "command_deadband" => the_decisive_law_goes_through_held_out_points(&outcome, "command", false),
+            _ => (),
+        }
     }
 }
 
@@ -310,9 +323,7 @@ fn effects_without_excitation_are_not_named() {
     }
 }
 
-#[test]
-fn files_are_written_whole_and_the_patched_rig_reads_back() {
-    let outcome = run(&rig(OFF, OFFSET), &setup("cogging"));
+fn files_are_written_whole_and_the_patched_rig_reads_back(outcome: &Outcome) {
     let dir = std::env::temp_dir().join(format!("diagnosis-{}", std::process::id()));
     outcome.write(&dir).expect("can be written");
     let patched = Rig::read(&dir.join("patched-rig.toml")).expect("reads back");
@@ -331,35 +342,29 @@ fn files_are_written_whole_and_the_patched_rig_reads_back() {
 }
 
 /// The law was fitted to other recordings than those whose points it goes through.
+fn the_decisive_law_goes_through_held_out_points(outcome: &Outcome, variable: &str, along_motion: bool) {
+    let effect = outcome.report.effects[0].name;
+    let plot = outcome.evidence.decisive.as_ref().unwrap_or_else(|| panic!("{effect} has no plot"));
+    let found = (plot.name, plot.variable, plot.along_motion);
+    assert_eq!(found, (effect, variable, along_motion));
+    let rows = plot.held_out.iter().zip(&plot.law).zip(&plot.band);
+    let rows: Vec<(f64, f64, [f64; 2])> =
+        rows.filter_map(|((bin, law), band)| Some((bin.as_ref()?.mean, (*law)?, (*band)?))).collect();
+    assert!(rows.len() > 10, "{effect}: {} bins", rows.len());
+    let square =
+        |value: fn(&(f64, f64, [f64; 2])) -> f64| rows.iter().map(|row| value(row).powi(2)).sum::<f64>();
+    let left = (square(|(mean, law, _)| mean - law) / square(|(mean, ..)| *mean)).sqrt();
+    assert!(left < 0.35 || along_motion && left < 0.6, "{effect}: the law is {left} off the points");
+    assert!(rows.iter().all(|(_, law, [low, high])| low <= law && law <= high), "{effect}: {rows:?}");
+    let wide = (square(|(.., [low, high])| high - low) / square(|(_, law, _)| *law)).sqrt();
+    let values = outcome.report.effects[0].parameters.values();
+    let known = values.map(|p| (p.ci95[1] - p.ci95[0]) / p.value.abs()).fold(f64::INFINITY, f64::min);
+    println!("{effect}: band {wide} of the law, best known value within {known}");
+    assert!((0.5 * known..1.5).contains(&wide), "{effect}: a band of {wide} of the law");
+}
+
 #[test]
-fn the_decisive_plot_has_the_law_go_through_held_out_points() {
-    // Friction that drifts brakes either way, so that it shows in the direction of motion only, and
-    // how much depends on how a recording moves; a deadband has no coefficient, only a shape.
-    for (effect, variable, along_motion) in [
-        ("cogging", "angle", false),
-        ("quadratic_drag", "speed", false),
-        ("friction_drift", "time", true),
-        ("command_deadband", "command", false),
-    ] {
-        let outcome = run(&rig(OFF, OFFSET), &setup(effect));
-        let plot = outcome.evidence.decisive.as_ref().unwrap_or_else(|| panic!("{effect} has no plot"));
-        let found = (plot.name, plot.variable, plot.along_motion);
-        assert_eq!(found, (outcome.report.effects[0].name, variable, along_motion), "{effect}");
-        let rows = plot.held_out.iter().zip(&plot.law).zip(&plot.band);
-        let rows: Vec<(f64, f64, [f64; 2])> =
-            rows.filter_map(|((bin, law), band)| Some((bin.as_ref()?.mean, (*law)?, (*band)?))).collect();
-        assert!(rows.len() > 10, "{effect}: {} bins", rows.len());
-        let square =
-            |value: fn(&(f64, f64, [f64; 2])) -> f64| rows.iter().map(|row| value(row).powi(2)).sum::<f64>();
-        let left = (square(|(mean, law, _)| mean - law) / square(|(mean, ..)| *mean)).sqrt();
-        assert!(left < 0.35 || along_motion && left < 0.6, "{effect}: the law is {left} off the points");
-        assert!(rows.iter().all(|(_, law, [low, high])| low <= law && law <= high), "{effect}: {rows:?}");
-        let wide = (square(|(.., [low, high])| high - low) / square(|(_, law, _)| *law)).sqrt();
-        let values = outcome.report.effects[0].parameters.values();
-        let known = values.map(|p| (p.ci95[1] - p.ci95[0]) / p.value.abs()).fold(f64::INFINITY, f64::min);
-        println!("{effect}: band {wide} of the law, best known value within {known}");
-        assert!((0.5 * known..1.5).contains(&wide), "{effect}: a band of {wide} of the law");
-    }
+fn a_delay_has_no_decisive_plot() {
     let delay = run(&rig(OFF, OFFSET), &setup("command_delay"));
     assert_eq!(delay.report.effects[0].name.as_str(), "command_delay");
     assert!(delay.evidence.decisive.is_none(), "a delay shows over no state");

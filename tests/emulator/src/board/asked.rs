@@ -50,9 +50,9 @@ impl Board {
     /// When the image has no such handler.
     pub fn count_runs_of(&self, name: &str) {
         let bytes = std::fs::read(&self.image).expect("the image that runs");
-        let handler = self.symbols.iter().find(|symbol| symbol.name == name);
+        let handler = self.file.symbols.iter().find(|symbol| symbol.name == name);
         let entry = handler.unwrap_or_else(|| panic!("the image has no handler {name}")).address;
-        let exits = elf::exits(&bytes, &self.symbols, entry);
+        let exits = elf::exits(&bytes, &self.file.symbols, entry);
         self.probe.tally().counted = Some(Counted { entry, exits });
     }
 

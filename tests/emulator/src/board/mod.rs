@@ -14,6 +14,7 @@ mod dac;
 pub mod elf;
 mod exti;
 pub mod flash;
+mod image_file;
 pub mod log;
 mod machine;
 pub mod otg;
@@ -37,14 +38,13 @@ pub mod wires;
 mod world;
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
 
 use control_core::Device;
 use rigless::emulator::{self, Start};
-use rigless::image::Image;
 use rigless::session::Session;
-use rigless::symbols::Symbols;
 use rigless::time::VirtualNanos;
 
 pub use amplifier::Amplifier;
@@ -56,10 +56,10 @@ pub use stopped::Stopped;
 pub use usb_port::UsbPort;
 pub use world::{EncoderRead, Log, Output};
 
+use image_file::ImageFile;
 use machine::Machine;
 use pins::Pins;
 use run::{Done, Order, Run};
-use warm_core::ImageKey;
 use world::{PAINT, World};
 
 /// A millisecond of virtual time.
@@ -209,7 +209,7 @@ pub struct Board {
     flash: flash::Flash,
     image: PathBuf,
     wiring: Wiring,
-    symbols: Vec<elf::Symbol>,
+    file: Arc<ImageFile>,
     stack: Option<(u64, u64)>,
     now: Nanos,
 }
@@ -229,13 +229,8 @@ impl Board {
         saved: Option<&Saved>,
     ) -> Result<Self, Refused> {
         let refuse = |why: String| Refused(format!("{}: {why}", path.display()));
-        let bytes = std::fs::read(path)
-            .map_err(|error| refuse(format!("{error}; `cargo xtask firmware` builds the image")))?;
-        let symbols = elf::symbols(&bytes);
-        let key = ImageKey::of(&bytes);
-        // The linker's own names have no type, so the emulator's reader finds them.
-        let places = Symbols::read(&bytes, |address| address).map_err(|error| refuse(error.to_string()))?;
-        let image = Image::new(path, bytes, None).map_err(|error| refuse(error.to_string()))?;
+        let file = ImageFile::read(path)?;
+        let key = file.key;
         let (probe, flash) = (Probe::default(), flash::Flash::default());
         flash.array().supply = wiring.supply;
         if wiring.commissioned {
@@ -245,7 +240,7 @@ impl Board {
             .map_err(|error| refuse(error.to_string()))?;
         let mut session =
             Session::new(Box::new(machine), 0, VirtualNanos(0)).map_err(|error| refuse(error.to_string()))?;
-        let find = |name: &str| places.get(name).ok();
+        let find = |name: &str| file.places.get(name).ok();
         let stack = find("_stack_start").map(|top| {
             // The stack ends where the image says, or at the foot of the memory its top is in.
             let low =
@@ -261,15 +256,15 @@ impl Board {
             .transpose()
             .map_err(|error| refuse(error.to_string()))?;
         let run = Run::new(world, key, resume.is_some(), (taken, answer));
+        let placed = file.clone();
         let thread = std::thread::spawn(move || {
-            let images = [image];
-            let mut start = Start::new(&images);
+            let mut start = Start::new(&placed.images);
             start.resume = resume.as_ref();
             let finished = emulator::run(session, &start, run);
             finished.map(drop).map_err(|error| error.to_string())
         });
         let (image, now) = (path.to_path_buf(), saved.map_or(0, |saved| saved.now));
-        Ok(Self { orders, done, thread: Some(thread), probe, flash, image, wiring, symbols, stack, now })
+        Ok(Self { orders, done, thread: Some(thread), probe, flash, image, wiring, file, stack, now })
     }
 
     fn order(&mut self, order: Order) {
@@ -318,7 +313,7 @@ impl Board {
     ///
     /// When the image has no such memory.
     pub fn cool_motor(&mut self) {
-        let words = self.symbols.iter().find(|symbol| symbol.name.contains("LAST_WORDS"));
+        let words = self.file.symbols.iter().find(|symbol| symbol.name.contains("LAST_WORDS"));
         let end = words.map(|symbol| symbol.address + symbol.size).expect("the last words");
         let is_left = self.at_stop(move |stopped| {
             stopped.set_word((end - 8).into(), 0) && stopped.set_word((end - 4).into(), u32::MAX)
@@ -341,13 +336,16 @@ impl Board {
     /// Every function and object of the image.
     #[must_use]
     pub fn symbols(&self) -> &[elf::Symbol] {
-        &self.symbols
+        &self.file.symbols
     }
 
     /// The function or object at `address`.
     #[must_use]
     pub fn symbol_at(&self, address: u32) -> Option<&elf::Symbol> {
-        self.symbols.iter().find(|symbol| (symbol.address..symbol.address + symbol.size).contains(&address))
+        self.file
+            .symbols
+            .iter()
+            .find(|symbol| (symbol.address..symbol.address + symbol.size).contains(&address))
     }
 
     /// The most stack the firmware has used, and what it has, in bytes; `None` where the image
