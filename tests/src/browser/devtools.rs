@@ -35,13 +35,10 @@ impl DevTools {
         Ok(Self { socket, last_id: 0, session: None, events: Vec::new() })
     }
 
-    /// From here on calls go to a new tab of a profile.
-    pub fn open_tab(&mut self, profile: &str) -> Result<(), Error> {
+    /// From here on calls go to a new tab.
+    pub fn open_tab(&mut self) -> Result<(), Error> {
         let text = |value: &Value, key: &str| value[key].as_str().map(str::to_owned).ok_or("no id of a tab");
-        let tab = self.call(
-            "Target.createTarget",
-            json!({ "url": "about:blank", "browserContextId": profile, "newWindow": true }),
-        )?;
+        let tab = self.call("Target.createTarget", json!({ "url": "about:blank" }))?;
         let attach = json!({ "targetId": text(&tab, "targetId")?, "flatten": true });
         let attached = self.call("Target.attachToTarget", attach)?;
         self.session = Some(text(&attached, "sessionId")?);

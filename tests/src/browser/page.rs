@@ -14,7 +14,8 @@ pub struct Page {
 impl Page {
     /// Opens `url` in a view of `width` by `height` CSS pixels; a phone has fingers.
     pub fn open(browser: &Chromium, url: &str, width: u32, height: u32, phone: bool) -> Result<Self, Error> {
-        let mut devtools = browser.tab()?;
+        let mut devtools = browser.devtools()?;
+        devtools.open_tab()?;
         for domain in ["Page", "Runtime", "Log", "Network"] {
             devtools.call(&format!("{domain}.enable"), json!({}))?;
         }

@@ -42,7 +42,7 @@ fn a_person_watches_takes_the_needle_stops_and_comes_back() {
 fn visit() -> Result<(), Error> {
     let places = Places::find()?;
     let scratch = places.scratch("page-test")?;
-    let browser = Chromium::start_alone(&scratch)?;
+    let browser = Chromium::start(&scratch)?;
     let recording = scratch.join("watched.mcap");
     let _ = fs::remove_file(&recording);
     let mut program = Program::start(&places.program, 0, Some(&recording))?;
