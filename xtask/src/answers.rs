@@ -2,8 +2,8 @@
 //! recordings, compared to the digit.
 //!
 //! A commit that changes answers on purpose says so with a line `Answers changed: …` in its
-//! message; the comparison without `--against` begins there, or at the newest commit that is a day
-//! old.
+//! message; against a revision these are listed below the comparison. The comparison without
+//! `--against` begins there, or at the newest commit that is a day old.
 
 use crate::shell::{self, Error, cargo};
 use crate::workspace_build::{ANY_RUST, built};
@@ -34,7 +34,28 @@ pub(crate) fn run(arguments: &[String]) -> Result<(), Error> {
             }
         },
     };
-    compare(&before, &rest)
+    let compared = compare(&before, &rest);
+    if let Some(revision) = against.filter(|one| !Path::new(one).is_file()) {
+        println!("{}", announced(revision)?);
+    }
+    compared
+}
+
+/// Returns what the commits after `revision` say of the answers that they change, the oldest first.
+fn announced(revision: &str) -> Result<String, Error> {
+    let range = format!("{revision}..HEAD");
+    let log =
+        git(&["log", "--reverse", "--no-merges", "--grep", CHANGED, "--format=%x1e%h %s%x1f%b", &range])?;
+    let said: Vec<String> = log.split('\u{1e}').filter_map(announcement).collect();
+    Ok(format!("{} commits since {revision} change answers on purpose:\n{}", said.len(), said.join("\n")))
+}
+
+/// Returns the subject of a commit and what its body says of changed answers.
+fn announcement(commit: &str) -> Option<String> {
+    let (subject, body) = commit.split_once('\u{1f}')?;
+    let (_, said) = body.split_once(CHANGED.trim_start_matches('^'))?;
+    let said = said.split("\n\n").next()?.split_whitespace().collect::<Vec<_>>().join(" ");
+    Some(format!("{subject}: {said}"))
 }
 
 /// Compares with the last commit whose answers this one promises to keep.
@@ -148,6 +169,13 @@ mod tests {
         let (found, rest) = against(&arguments).expect("a value follows");
         assert_eq!((found, rest.len()), (Some("HEAD~1"), 4));
         assert_eq!(against(&arguments[..3]).expect_err("no value follows").status, 2);
+    }
+
+    #[test]
+    fn a_commit_says_what_it_changes_up_to_an_empty_line() {
+        let commit = "1234567 Know gears\u{1f}Why.\n\nAnswers changed: a gear of 50\nis named.\n\nMore.\n";
+        assert_eq!(announcement(commit).as_deref(), Some("1234567 Know gears: a gear of 50 is named."));
+        assert_eq!(announcement("1234567 Know gears\u{1f}Why.\n"), None);
     }
 
     #[test]

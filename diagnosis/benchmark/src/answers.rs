@@ -1,8 +1,9 @@
 //! Two programs on the same recordings: what differs between their answers, to the digit, by key.
 //!
 //! A change that is meant to leave the diagnosis as it is, is checked by its answers:
-//! `diagnosis.json` is compared value by value, and `patched-rig.toml` as text. Recordings come
-//! from the generator, in the short form of the small run.
+//! `diagnosis.json` is compared value by value, and `patched-rig.toml` as text. Where verdict or
+//! names differ, the reasons that the two programs themselves give are told. Recordings come from
+//! the generator, in the short form of the small run.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -30,6 +31,15 @@ pub(crate) struct Difference {
     pub(crate) after: String,
 }
 
+/// A recording with what differs between the answers of two programs.
+struct Compared {
+    name: String,
+    differences: Vec<Difference>,
+    /// What became of verdict and names, each with the program's reason; none where they are the
+    /// same.
+    change: Option<String>,
+}
+
 /// Compares the answers of two programs on the first `count` of `specs` that can be built.
 ///
 /// # Errors
@@ -41,7 +51,7 @@ pub(crate) fn run(
     [before, after]: [&dyn Tool; 2],
 ) -> Result<(), String> {
     let scratch = Scratch::new()?;
-    let mut compared: Vec<(String, Vec<Difference>)> = Vec::new();
+    let mut compared: Vec<Compared> = Vec::new();
     let mut rest = specs;
     while compared.len() < count && !rest.is_empty() {
         let (now, later) = rest.split_at(rest.len().min(count - compared.len()));
@@ -53,7 +63,7 @@ pub(crate) fn run(
         compared.extend(found.into_iter().flatten());
     }
     print!("{}", table(&compared));
-    let other = compared.iter().filter(|(_, differences)| !differences.is_empty()).count();
+    let other = compared.iter().filter(|one| !one.differences.is_empty()).count();
     match (compared.len(), other) {
         (0, _) => Err("no recording was drawn, so nothing was compared; leave out --only".into()),
         (_, 0) => Ok(()),
@@ -63,21 +73,63 @@ pub(crate) fn run(
     }
 }
 
-/// Draws a recording, asks both programs and returns its name with what differs; `None` if it
-/// cannot be built.
+/// Draws a recording, asks both programs and returns what differs; `None` if it cannot be built.
 fn compare(
     spec: &Spec,
     seed: u64,
     tools: [&dyn Tool; 2],
     scratch: &Path,
-) -> Result<Option<(String, Vec<Difference>)>, String> {
+) -> Result<Option<Compared>, String> {
     let Some(case) = build(spec, seed, true) else { return Ok(None) };
     let dir = scratch.join(spec.name());
     let paths = files::write_case(&case, &dir).map_err(|e| format!("cannot write {}: {e}", dir.display()))?;
     let [before, after] = [0, 1].map(|i| answer(tools[i], &paths, &dir.join(format!("answer-{i}"))));
-    let differences = differences(&before?, &after?);
+    let (before, after) = (before?, after?);
     std::fs::remove_dir_all(&dir).map_err(|e| format!("cannot remove {}: {e}", dir.display()))?;
-    Ok(Some((spec.name(), differences)))
+    let (differences, change) = (differences(&before, &after), change(&before, &after));
+    Ok(Some(Compared { name: spec.name(), differences, change }))
+}
+
+/// Returns what became of verdict and names, each with the program's own reason; none where they
+/// are the same.
+fn change(before: &Value, after: &Value) -> Option<String> {
+    let [was, is] = [before, after].map(names);
+    let gone = was.iter().filter(|name| !is.contains(name));
+    let new = is.iter().filter(|name| !was.contains(name));
+    let mut said: Vec<String> =
+        gone.map(|name| format!("{name} is not named any more ({})", refused(after, name))).collect();
+    said.extend(new.map(|name| format!("{name} is named (before: {})", refused(before, name))));
+    let [was, is] = [before, after].map(verdict);
+    if was != is {
+        said.push(format!("{was} → {is}"));
+    }
+    (!said.is_empty()).then(|| said.join("; "))
+}
+
+/// The names that an answer gives.
+fn names(answer: &Value) -> Vec<&str> {
+    let effects = answer["effects"].as_array().into_iter().flatten();
+    effects.filter_map(|effect| effect["name"].as_str()).collect()
+}
+
+/// The verdict of an answer with its reason; the sentence of a program that refused.
+fn verdict(answer: &Value) -> String {
+    match (answer["failed"].as_str(), answer["verdict"].as_str(), answer["reason"].as_str()) {
+        (Some(sentence), _, _) => format!("refused: {sentence}"),
+        (None, verdict, None) => verdict.unwrap_or("no verdict").to_owned(),
+        (None, verdict, Some(reason)) => format!("{}: {reason}", verdict.unwrap_or("no verdict")),
+    }
+}
+
+/// The reason for which an answer does not give a name.
+fn refused<'a>(answer: &'a Value, name: &str) -> &'a str {
+    let reason = |list: &str, key: &str| {
+        let all = answer[list].as_array()?;
+        all.iter().find(|one| one["name"] == name)?[key].as_str()
+    };
+    reason("hypotheses", "rejected_because")
+        .or_else(|| reason("untested", "because"))
+        .unwrap_or("not looked for")
 }
 
 /// Returns the files of an answer as one value; of a program that fails, its sentence.
@@ -130,10 +182,10 @@ fn walk(key: &str, before: &Value, after: &Value, found: &mut Vec<Difference>) {
 const WIDEST: usize = 60;
 
 /// Returns one line for each key that differs: on how many recordings, and the first of them with
-/// both values.
-fn table(compared: &[(String, Vec<Difference>)]) -> String {
+/// both values; then one for each recording whose verdict or names differ.
+fn table(compared: &[Compared]) -> String {
     let mut keys: BTreeMap<&str, (Vec<&str>, &Difference)> = BTreeMap::new();
-    for (name, differences) in compared {
+    for Compared { name, differences, .. } in compared {
         for one in differences {
             let (names, _) = keys.entry(&one.key).or_insert((Vec::new(), one));
             if names.last() != Some(&name.as_str()) {
@@ -150,8 +202,13 @@ fn table(compared: &[(String, Vec<Difference>)]) -> String {
         let (before, after) = (short(&first.before), short(&first.after));
         let _ = writeln!(out, "{key}: {} recordings, first {}: {before} → {after}", names.len(), names[0]);
     }
-    let same = compared.iter().filter(|(_, differences)| differences.is_empty()).count();
-    let _ = writeln!(out, "the same answers, to the digit, on {same} of {} recordings", compared.len());
+    let changed = compared.iter().filter_map(|one| Some((&one.name, one.change.as_ref()?)));
+    for (name, change) in changed.clone() {
+        let _ = writeln!(out, "{name}: {change}");
+    }
+    let (all, same) = (compared.len(), compared.iter().filter(|one| one.differences.is_empty()).count());
+    let _ = writeln!(out, "the same verdict and names on {} of {all} recordings", all - changed.count());
+    let _ = writeln!(out, "the same answers, to the digit, on {same} of {all} recordings");
     out
 }
 
@@ -180,12 +237,33 @@ mod tests {
         assert_eq!(found.len(), 1);
         assert_eq!(found[0].key, "effects[].value");
         assert_ne!(found[0].before, found[0].after);
-        let said = table(&[("case-1".into(), Vec::new()), ("case-2".into(), found)]);
+        let one = |name: &str, differences| Compared { name: name.into(), differences, change: None };
+        let said = table(&[one("case-1", Vec::new()), one("case-2", found)]);
         assert!(
             said.starts_with("effects[].value: 1 recordings, first case-2: 0.1234567890123456 → "),
             "{said}"
         );
         assert!(said.ends_with("on 1 of 2 recordings\n"), "{said}");
+    }
+
+    #[test]
+    fn another_name_is_told_with_both_programs_reasons() {
+        let refused = |name: &str, why: &str| json!([{ "name": name, "rejected_because": why }]);
+        let named = |name: &str| json!([{ "name": name, "value": 0.1 }]);
+        let before = json!({ "verdict": "mismatch", "effects": named("cogging"),
+            "hypotheses": refused("gain_drift", "it gains too little") });
+        let after = json!({ "verdict": "mismatch", "effects": named("gain_drift"),
+            "hypotheses": refused("cogging", "the travel is too short") });
+        assert_eq!(
+            change(&before, &after).as_deref(),
+            Some(
+                "cogging is not named any more (the travel is too short); gain_drift is named (before: it gains too little)"
+            )
+        );
+        let refusal = json!({ "failed": "fit.csv is at rest" });
+        let said = change(&before, &refusal).expect("the verdict is another one");
+        assert!(said.ends_with("mismatch → refused: fit.csv is at rest"), "{said}");
+        assert_eq!(change(&before, &before), None);
     }
 
     #[test]
