@@ -35,8 +35,8 @@ pub(crate) struct Difference {
 struct Compared {
     name: String,
     differences: Vec<Difference>,
-    /// What became of verdict and names, each with the program's reason; none where they are the
-    /// same.
+    /// The verdict and names that are other ones, each with the program's reason; none where they
+    /// are the same.
     change: Option<String>,
 }
 
