@@ -237,8 +237,7 @@ fn browser() -> Result<(), Error> {
     setup::browser()?;
     setup::node_packages(&IN_PAGES)?;
     site::build()?;
-    // In one process: its tests share a browser.
-    shell::run(cargo().args(["test", "--no-fail-fast", "--quiet"]).args(BUILD).args(["--test", "page"]))
+    shell::run(tests().args(["--test", "page"]))
 }
 
 /// Libraries of other people, each at the version that the check was written against.
