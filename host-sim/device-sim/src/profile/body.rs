@@ -15,6 +15,9 @@ const THINNEST_MM: f64 = 0.2;
 const REACH_MM: f64 = 55.0;
 /// Cartilage over the bone of a joint, mm: an assumption, 1 to 2 mm where it bears load.
 const OVER_BONE_MM: f64 = 1.5;
+/// The wall on the far side of an artery. It is no target and nothing to be spared: whoever comes to
+/// it has entered the artery.
+const FAR_ARTERIAL_WALL: &str = "far arterial wall";
 /// Thickness that fat may have, mm.
 const FAT_MM: [f64; 2] = [1.0, 60.0];
 
@@ -132,7 +135,8 @@ fn tissue_name(tissue: Tissue) -> TissueName {
 impl InBody {
     /// Returns the layers along the line, each with the forces of the file's layer of its tissue
     /// and its depth for a needle of this inclination, and notes their names. The device holds six:
-    /// past the sixth the needle goes on in it.
+    /// of more, those that feel like what they lie in are left out, and past the sixth the needle
+    /// goes on in it.
     pub(super) fn layers(&mut self, kinds: &[Layer]) -> Result<Vec<Layer>, String> {
         let of = |tissue: TissueName| kinds.iter().find(|layer| layer.tissue == tissue);
         if let Some(missing) =
@@ -145,12 +149,20 @@ impl InBody {
             ));
         }
         let sine = libm::sin(self.place.incline_deg.to_radians());
-        let has_far_wall = of(TissueName::FarWall).is_some();
-        let mut met = self.met_along(&self.pieces, has_far_wall);
+        let mut met = self.met_along(&self.pieces);
+        let is_needless = |above: TissueName, own: TissueName| {
+            of(above).zip(of(own)).is_some_and(|(above, own)| own.feels_like(above))
+        };
+        while met.len() > MAX_LAYERS
+            && let Some(needless) = met.windows(2).rposition(|pair| is_needless(pair[0].0, pair[1].0))
+        {
+            met.remove(needless + 1);
+        }
         met.truncate(MAX_LAYERS);
-        let layers = met.iter().filter_map(|(tissue, _, from_mm)| {
+        let layers = met.iter().filter_map(|(tissue, name, from_mm)| {
             let kind = of(*tissue)?.clone();
-            Some(Layer { depth_mm: Some(from_mm * sine), thickness: None, ..kind })
+            let spare = if *name == FAR_ARTERIAL_WALL { Some(false) } else { kind.spare };
+            Some(Layer { depth_mm: Some(from_mm * sine), thickness: None, spare, ..kind })
         });
         let layers = layers.collect();
         let names = met.into_iter().map(|(_, name, _)| name.to_owned()).collect();
@@ -159,7 +171,7 @@ impl InBody {
     }
 
     /// Returns tissue, name and beginning in mm of the layers that `pieces` of a line are.
-    fn met_along(&self, pieces: &[Piece], has_far_wall: bool) -> Vec<(TissueName, &'static str, f64)> {
+    fn met_along(&self, pieces: &[Piece]) -> Vec<(TissueName, &'static str, f64)> {
         let (mut met, mut last, mut vessel, mut under_wall) = (Vec::new(), None, false, None);
         for piece in pieces {
             let structure = &self.body.structures[piece.structure];
@@ -178,13 +190,14 @@ impl InBody {
                 continue;
             }
             met.push((tissue, structure.name, piece.from_mm));
-            if tissue == TissueName::Vessel {
-                vessel = true;
-                if has_far_wall {
-                    met.push((TissueName::FarWall, "far wall", piece.to_mm));
-                    under_wall = Some(piece.to_mm);
-                }
-            }
+            let far = match structure.tissue {
+                Tissue::Vessel => (TissueName::FarWall, "far wall"),
+                Tissue::Artery => (tissue, FAR_ARTERIAL_WALL),
+                _ => continue,
+            };
+            vessel |= tissue == TissueName::Vessel;
+            met.push((far.0, far.1, piece.to_mm));
+            under_wall = Some(piece.to_mm);
         }
         met
     }
@@ -194,7 +207,7 @@ impl InBody {
     /// plane, along it and below the point of entry, and is inclined by `incline_rad`.
     pub(crate) fn tops_mm(&self, origin_mm: [f64; 2], incline_rad: f64) -> Vec<Option<f64>> {
         let pieces = self.pieces_along(origin_mm, incline_rad);
-        let met = self.met_along(&pieces, true);
+        let met = self.met_along(&pieces);
         let mut from = 0;
         let top = |name: &String| {
             let found = from + met[from..].iter().position(|(_, own, _)| own == name)?;

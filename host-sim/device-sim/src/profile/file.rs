@@ -133,6 +133,12 @@ impl Layer {
         self.spare.unwrap_or(matches!(self.tissue, TissueName::Tendon | TissueName::Cartilage))
     }
 
+    /// True if a needle that comes into it from a layer `above` feels no change.
+    pub(super) fn feels_like(&self, above: &Self) -> bool {
+        let is_like = self.cutting == above.cutting && self.friction_n_per_mm == above.friction_n_per_mm;
+        self.wall.is_none() && !self.is_spared() && is_like
+    }
+
     fn config(&self, depth_mm: f64) -> Result<config::Layer, String> {
         let wall = self.wall.as_ref().map(|wall| {
             Ok::<_, String>(config::Wall {

@@ -115,7 +115,7 @@ pub(super) enum Friction {
 }
 
 /// `cutting` of a layer.
-#[derive(Clone, Copy, Deserialize)]
+#[derive(Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Cut {
     pub(super) inwards_n: f64,

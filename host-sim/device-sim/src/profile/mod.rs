@@ -111,6 +111,7 @@ impl Profile {
         file.beside.iter().try_for_each(Beside::check).map_err(refuse)?;
         condition::apply(&mut file.layer, &file.patient, file.force_table.is_some()).map_err(refuse)?;
         file.target.map_or(Ok(()), |goal| goal.check(&file.layer)).map_err(refuse)?;
+        check_vessels(&file.layer).map_err(refuse)?;
         let is_vein = |layer: &Layer| layer.tissue == TissueName::Vessel && !layer.is_spared();
         let has_vein = file.layer.iter().any(is_vein);
         let body = file.take_body().map_err(refuse)?;
@@ -200,6 +201,12 @@ impl Profile {
         Some(tissue_name(layer.tissue).to_owned())
     }
 
+    /// Returns the number of the vessel's far wall.
+    pub fn far_wall(&self) -> Option<u8> {
+        let mut layers = (0_u8..).zip(&self.config.patient.layers);
+        layers.find(|(_, layer)| layer.tissue == Tissue::FarWall).map(|(number, _)| number)
+    }
+
     /// Returns for each layer, outermost first, whether it has a wall that gives way.
     pub fn walls(&self) -> Vec<bool> {
         goal::walls(&self.config.patient, self.entry_rad)
@@ -248,6 +255,17 @@ impl Profile {
 pub(crate) fn puncture_path_mm(layer: &config::Layer, angle_rad: f64) -> Option<f64> {
     let wall = layer.wall?;
     Some(layer.depth.0.to_num::<f64>() / libm::sin(angle_rad) + wall.puncture_travel.0.to_num::<f64>())
+}
+
+/// Refuses a vessel without a far wall: through it a needle would stay in the lumen for ever.
+fn check_vessels(layers: &[Layer]) -> Result<(), String> {
+    let number = |tissue| layers.iter().position(|layer| layer.tissue == tissue);
+    match (number(TissueName::Vessel), number(TissueName::FarWall)) {
+        (Some(near), None) => Err(format!(
+            "layer {near} is a vessel without a far wall; add a layer of tissue \"far-wall\" below it"
+        )),
+        _ => Ok(()),
+    }
 }
 
 /// `(T − n)²/a + b` of Paper 001, eq. 1, in N; `travel_mm` is T.

@@ -107,6 +107,7 @@ fn mistakes_are_named_with_their_line() {
         (BUILT_IN[0].1.replace("depth_mm = 2.0", "depth_mm = 1e300"), "depth_mm"),
         (format!("{}\n[limits]\ntorque_mnm = 90.0\n", BUILT_IN[0].1), "limits"),
         (format!("largest_force_n = 9.0\n{}", BUILT_IN[0].1), "ceiling of 2.880 N"),
+        (BUILT_IN[0].1.replace("\"far-wall\"", "\"muscle\""), "layer 2 is a vessel without a far wall"),
         ("[[layer]".into(), "line 1"),
         (String::new(), "format"),
     ] {

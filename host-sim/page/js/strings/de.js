@@ -180,6 +180,7 @@ export default {
   "tissue.bursa": "Schleimbeutel",
   "tissue.tendon": "Sehne",
   "tissue.cartilage": "Knorpel",
+  "tissue.far_arterial_wall": "Hinterwand der Arterie",
   "tissue.far_wall": "Hinterwand",
   "tissue.deltoid": "Deltamuskel",
   "tissue.rotator_cuff": "Rotatorenmanschette",

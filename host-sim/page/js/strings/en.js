@@ -180,6 +180,7 @@ export default {
   "tissue.bursa": "bursa",
   "tissue.tendon": "tendon",
   "tissue.cartilage": "cartilage",
+  "tissue.far_arterial_wall": "far arterial wall",
   "tissue.far_wall": "far wall",
   "tissue.deltoid": "deltoid",
   "tissue.rotator_cuff": "rotator cuff",

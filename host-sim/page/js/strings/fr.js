@@ -180,6 +180,7 @@ export default {
   "tissue.bursa": "bourse séreuse",
   "tissue.tendon": "tendon",
   "tissue.cartilage": "cartilage",
+  "tissue.far_arterial_wall": "paroi profonde de l’artère",
   "tissue.far_wall": "paroi profonde",
   "tissue.deltoid": "deltoïde",
   "tissue.rotator_cuff": "coiffe des rotateurs",

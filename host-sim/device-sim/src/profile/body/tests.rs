@@ -65,6 +65,38 @@ fn a_vein_that_is_missed_leaves_fat_and_muscle() {
     assert_eq!(over, ["skin", "fat", "vein", "far wall", "muscle"]);
 }
 
+/// The artery of the forearm, a tube of 4 mm across, is met through two walls, also under the
+/// vein, where the device has room for six layers.
+#[test]
+fn an_artery_has_a_far_wall() {
+    for (angle, around, azimuth, names) in [
+        (60.0, -8.0, 0.0, vec!["skin", "fat", "muscle", "artery", "far arterial wall"]),
+        (68.5, 4.0, -90.0, vec!["skin", "fat", "vein", "far wall", "artery", "far arterial wall"]),
+    ] {
+        let entry = Entry {
+            angle_deg: Some(angle),
+            along_mm: Some(10.0),
+            around_deg: Some(around),
+            azimuth_deg: Some(azimuth),
+            turn_deg: None,
+        };
+        let profile = find("forearm").entered(&entry).expect("it goes in");
+        let told = layers(&profile);
+        assert_eq!(told.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>(), names);
+        let body = profile.body.as_ref().expect("a body");
+        let piece = body.pieces.iter().find(|piece| body.body.structures[piece.structure].name == "artery");
+        let piece = piece.expect("it is met");
+        let at = told.iter().position(|(name, _)| name == "artery").expect("it is met");
+        assert!((told[at].1 - piece.from_mm).abs() < 2e-3 && (told[at + 1].1 - piece.to_mm).abs() < 2e-3);
+        let wall = |layer: usize| profile.config.patient.layers[layer].wall.expect("a wall").puncture_travel;
+        assert_eq!(wall(at), wall(at + 1), "the far wall is as strong as the near one");
+        assert_eq!(profile.spared, [at as u8], "only the artery is to be spared");
+        // A needle that turns meets both walls where its line does.
+        let tops = body.tops_mm([0.0; 2], profile.entry_rad);
+        assert!(tops[at].zip(tops[at + 1]).is_some_and(|(near, far)| far > near + 1.0), "{tops:?}");
+    }
+}
+
 #[test]
 fn a_body_that_cannot_be_entered_is_refused_with_its_reason() {
     let forearm = BUILT_IN.iter().find(|(name, _)| *name == "forearm").expect("it is built in").1;
