@@ -67,6 +67,9 @@ pub(super) enum LawTable {
         relax_ms: u16,
         #[serde(default = "after_puncture")]
         after_puncture: f64,
+        /// A wall resists no more to a fast needle if it is left out: the paper has no rate term.
+        #[serde(default)]
+        wall_rate_s_per_mm: f64,
         friction: Bristles,
         fixture: Direction,
     },
@@ -136,16 +139,22 @@ pub(super) fn law(
             Some(friction) => Law::Jog(friction.law()?),
             None => usual.clone(),
         },
-        Some(LawTable::Sparte { tracking_n_per_mm, relax_ms, after_puncture, friction, fixture }) => {
-            Law::Sparte(Sparte {
-                tracking: Stiffness(fix("tracking_n_per_mm", *tracking_n_per_mm)?),
-                relax_ms: *relax_ms,
-                after_puncture: fix("after_puncture", *after_puncture)?,
-                cutting: cutting(layers)?.into_iter().collect(),
-                friction: friction.lugre()?,
-                fixture: fixture.fixture()?,
-            })
-        }
+        Some(LawTable::Sparte {
+            tracking_n_per_mm,
+            relax_ms,
+            after_puncture,
+            wall_rate_s_per_mm,
+            friction,
+            fixture,
+        }) => Law::Sparte(Sparte {
+            tracking: Stiffness(fix("tracking_n_per_mm", *tracking_n_per_mm)?),
+            relax_ms: *relax_ms,
+            after_puncture: fix("after_puncture", *after_puncture)?,
+            cutting: cutting(layers)?.into_iter().collect(),
+            friction: friction.lugre()?,
+            fixture: fixture.fixture()?,
+            wall_rate: fix("wall_rate_s_per_mm", *wall_rate_s_per_mm)?,
+        }),
         Some(LawTable::Xr { stiffness_n_per_mm, withdrawal }) => {
             let forces = forces
                 .ok_or("[force_table] is missing; law.model xr needs the table that fit-force writes")?;
