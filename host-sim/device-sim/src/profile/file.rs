@@ -1,6 +1,7 @@
 //! A patient's file as it is written, and its numbers as the control law holds them.
 
 use super::force_table::Forces;
+use super::needle::Needle;
 use super::person::{self, Thickness};
 use super::{Beside, Person, TissueName, body, goal, law};
 use control_core::Patient;
@@ -25,6 +26,7 @@ pub(super) struct File {
     pub(super) patient: Person,
     pub(super) law: Option<law::LawTable>,
     pub(super) friction: Option<law::Friction>,
+    pub(super) needle: Option<Needle>,
     pub(super) force_table: Option<Forces>,
     pub(super) layer: Vec<Layer>,
     pub(super) body: Option<body::Written>,

@@ -205,6 +205,18 @@ fn cutting(layers: &[Layer]) -> Result<Vec<Cutting>, String> {
 }
 
 impl Bristles {
+    /// Multiplies the friction by `factor`; the stiffness of the bristles stays.
+    pub(super) fn scale(&mut self, factor: f64) {
+        for value in [
+            &mut self.damping_n_s_per_mm,
+            &mut self.viscous_n_s_per_mm,
+            &mut self.sliding_n,
+            &mut self.sticking_n,
+        ] {
+            *value *= factor;
+        }
+    }
+
     fn lugre(&self) -> Result<Lugre, String> {
         Ok(Lugre {
             stiffness: Stiffness(fix("stiffness_n_per_mm", self.stiffness_n_per_mm)?),

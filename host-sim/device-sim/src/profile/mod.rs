@@ -11,6 +11,7 @@ mod file;
 mod force_table;
 mod goal;
 mod law;
+mod needle;
 mod person;
 mod refusal;
 mod rupture;
@@ -110,6 +111,9 @@ impl Profile {
         file.patient.check().map_err(refuse)?;
         file.beside.iter().try_for_each(Beside::check).map_err(refuse)?;
         condition::apply(&mut file.layer, &file.patient, file.force_table.is_some()).map_err(refuse)?;
+        if let Some(needle) = file.needle {
+            needle.apply(&mut file.layer, file.law.as_mut()).map_err(refuse)?;
+        }
         file.target.map_or(Ok(()), |goal| goal.check(&file.layer)).map_err(refuse)?;
         check_vessels(&file.layer).map_err(refuse)?;
         let is_vein = |layer: &Layer| layer.tissue == TissueName::Vessel && !layer.is_spared();
