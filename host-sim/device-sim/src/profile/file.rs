@@ -3,7 +3,7 @@
 use super::force_table::Forces;
 use super::needle::Needle;
 use super::person::{self, Thickness};
-use super::{Beside, Person, TissueName, body, goal, law};
+use super::{Beside, Person, Slope, TissueName, body, goal, law};
 use control_core::Patient;
 use control_core::config;
 use control_core::units::{FrictionPerMillimetre, JogCompliance, Millimetres, Newtons, Stiffness};
@@ -17,6 +17,8 @@ pub(super) struct File {
     pub(super) name: String,
     /// Angle of the needle to the skin at entry, 5 to 90 degrees.
     pub(super) entry_deg: f64,
+    /// The range of angles to the skin that the device's barrier leaves.
+    pub(super) slope_deg: Option<Slope>,
     /// In N; without it, as much as the device gives.
     pub(super) largest_force_n: Option<f64>,
     /// Share of the law's forces that is given to the hand, where the motor is too weak for them.

@@ -25,8 +25,8 @@ use control_core::{Device, Plan};
 
 pub use beside::Beside;
 pub use body::InBody;
-pub use entry::Entry;
-use entry::check_angle;
+pub(crate) use entry::check_entry;
+pub use entry::{Entry, Slope};
 pub(crate) use file::fix;
 use file::{File, Layer};
 pub use goal::Goal;
@@ -60,6 +60,8 @@ pub struct Profile {
     pub name: String,
     /// Angle of the needle to the skin at entry, in rad.
     pub entry_rad: f64,
+    /// The angles to the skin between which the device's barrier holds the needle, if it has one.
+    pub slope: Option<Slope>,
     /// The device's configuration: its own part and this patient.
     pub config: Config,
     /// The same, checked.
@@ -107,7 +109,8 @@ impl Profile {
         if file.format != 1 {
             return Err(refuse(format!("format is {}; this program reads format 1", file.format)));
         }
-        check_angle("entry_deg", file.entry_deg).map_err(refuse)?;
+        file.slope_deg.map_or(Ok(()), Slope::check).map_err(refuse)?;
+        check_entry("entry_deg", file.entry_deg, file.slope_deg).map_err(refuse)?;
         file.patient.check().map_err(refuse)?;
         file.beside.iter().try_for_each(Beside::check).map_err(refuse)?;
         condition::apply(&mut file.layer, &file.patient, file.force_table.is_some()).map_err(refuse)?;
@@ -135,6 +138,7 @@ impl Profile {
             person: file.patient,
             name: file.name,
             entry_rad: file.entry_deg.to_radians(),
+            slope: file.slope_deg,
             config,
             plan,
             source,
@@ -180,6 +184,7 @@ impl Profile {
             force_scale: self.config.patient.scale.to_num(),
             tilt_rad: self.tilt_rad(),
             skin_tilt_rad: self.skin_tilt_rad(),
+            slope_deg: self.slope.map(|slope| [slope.smallest, slope.largest]),
             vessel: self.vessel().filter(|_| self.body.is_none()),
             body: self.body.as_ref().map(InBody::scene),
             beside: self.beside.iter().map(SceneBeside::from).collect(),
@@ -187,9 +192,9 @@ impl Profile {
         }
     }
 
-    /// The same patient with another angle to the skin at entry, 5 to 90°.
+    /// The same patient with another angle to the skin at entry, 5 to 90° and within its slope.
     pub fn at_angle(self, degrees: f64) -> Result<Self, Error> {
-        check_angle("--angle", degrees).map_err(Error::input)?;
+        check_entry("--angle", degrees, self.slope).map_err(Error::input)?;
         if self.body.is_some() {
             return self.entered(&Entry { angle_deg: Some(degrees), ..Entry::default() });
         }

@@ -31,6 +31,10 @@ pub struct Scene {
     /// Inclination of the needle laid on the skin, in rad; the angle to the skin is the rest of the
     /// tilt.
     pub skin_tilt_rad: f64,
+    /// The smallest and the largest angle to the skin, degrees, between which a barrier holds the
+    /// needle.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub slope_deg: Option<[f64; 2]>,
     /// The vessel, where there is one with two walls.
     pub vessel: Option<SceneVessel>,
     /// The body that the layers come from; without it they are slabs that go on for ever.

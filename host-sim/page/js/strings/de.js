@@ -268,6 +268,7 @@ export default {
   "sheet.sign": "Unterschrift",
   "task.tourniquet_on": "Stauschlauch anlegen",
   "task.tourniquet_off": "Stauschlauch lösen",
+  "task.slope_barrier": "Anschlag der Neigung: nicht weiter",
   "task.bone": "Knochen: Die Nadel stößt an",
   "task.anchor": "Vene fixieren",
   "task.catheter": "Katheter vorschieben",

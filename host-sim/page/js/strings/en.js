@@ -268,6 +268,7 @@ export default {
   "sheet.sign": "Signature",
   "task.tourniquet_on": "tourniquet on",
   "task.tourniquet_off": "tourniquet off",
+  "task.slope_barrier": "the slope’s barrier: no further",
   "task.bone": "bone: the needle is stopped",
   "task.anchor": "anchor the vein",
   "task.catheter": "catheter in",
