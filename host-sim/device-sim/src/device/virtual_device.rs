@@ -64,6 +64,8 @@ pub struct VirtualDevice {
     /// The step of the procedure that is going on, as soon as it has begun.
     step: Option<usize>,
     is_on_bone: bool,
+    /// Ticks until a needle that slips is reported again.
+    slips_for: u32,
     /// The tilt that the hand wants, and those at which a barrier stops the needle, rad.
     wanted_tilt: f64,
     tilt_limits: Option<[f64; 2]>,
@@ -121,6 +123,7 @@ impl VirtualDevice {
             tilt_limits: None,
             step: None,
             is_on_bone: false,
+            slips_for: 0,
             done: Vec::new(),
             set_value: 0.0,
             enable: false,
@@ -222,7 +225,17 @@ impl VirtualDevice {
         if self.is_on_bone && !was_on_bone {
             self.done.push("bone");
         }
+        self.note_slipping();
         self.tick += 1;
+    }
+
+    /// Reports a needle that slips in the rollers, once until it has held for half a second.
+    fn note_slipping(&mut self) {
+        if !self.plant.is_slipping() {
+            self.slips_for = self.slips_for.saturating_sub(1);
+        } else if std::mem::replace(&mut self.slips_for, TICK_HZ / 2) == 0 {
+            self.done.push("slipping");
+        }
     }
 
     /// Takes bytes from the PC.

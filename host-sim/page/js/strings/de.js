@@ -269,6 +269,7 @@ export default {
   "task.tourniquet_on": "Stauschlauch anlegen",
   "task.tourniquet_off": "Stauschlauch lösen",
   "task.slope_barrier": "Anschlag der Neigung: nicht weiter",
+  "task.slipping": "die Nadel rutscht in den Rollen",
   "task.bone": "Knochen: Die Nadel stößt an",
   "task.anchor": "Vene fixieren",
   "task.catheter": "Katheter vorschieben",

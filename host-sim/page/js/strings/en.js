@@ -269,6 +269,7 @@ export default {
   "task.tourniquet_on": "tourniquet on",
   "task.tourniquet_off": "tourniquet off",
   "task.slope_barrier": "the slope’s barrier: no further",
+  "task.slipping": "the needle slips in the rollers",
   "task.bone": "bone: the needle is stopped",
   "task.anchor": "anchor the vein",
   "task.catheter": "catheter in",

@@ -269,6 +269,7 @@ export default {
   "task.tourniquet_on": "poser le garrot",
   "task.tourniquet_off": "ôter le garrot",
   "task.slope_barrier": "butée d’inclinaison\u00a0: pas plus loin",
+  "task.slipping": "l’aiguille glisse dans les rouleaux",
   "task.bone": "os\u00a0: l’aiguille bute",
   "task.anchor": "fixer la veine",
   "task.catheter": "introduire le cathéter",
