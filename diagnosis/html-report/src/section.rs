@@ -31,6 +31,17 @@ pub struct Tube {
     pub high_mm: f64,
 }
 
+/// A structure of a body, cut.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Outline {
+    /// Its name.
+    pub name: String,
+    /// The tissue that sets its colour.
+    pub tissue: String,
+    /// A closed line, along the section and below the point of entry, mm.
+    pub points_mm: Vec<[f64; 2]>,
+}
+
 /// A way of the tip.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Way {
@@ -64,6 +75,8 @@ pub struct Section {
     pub bands: Vec<Band>,
     /// The vessel, if there is one.
     pub vessel: Option<Tube>,
+    /// The structures of a body, each painted over those before it, instead of level layers.
+    pub outlines: Vec<Outline>,
     /// The last on top.
     pub ways: Vec<Way>,
     /// The needle, if there is one, as far as the picture reaches.
@@ -108,7 +121,11 @@ impl Section {
                 safe(&way.name)
             );
         }
-        self.draw_tissue(&mut out, &view);
+        if self.outlines.is_empty() {
+            self.draw_tissue(&mut out, &view)
+        } else {
+            self.draw_body(&mut out, &view)
+        }
         if let Some(needle) = &self.needle {
             draw_needle(&mut out, needle, &view);
         }
@@ -189,6 +206,48 @@ impl Section {
     }
 }
 
+impl Section {
+    fn draw_body(&self, out: &mut String, view: &View) {
+        let high = (view.bottom - view.top) * view.scale;
+        let frame = |fill: &str| format!("x=0 y={:.1} width={WIDE} height={high:.1} {fill}/>", view.head);
+        let _ = write!(out, "<clipPath id=frame><rect {}</clipPath>", frame(""));
+        let _ = write!(out, "<rect {}", frame("style=\"fill:var(--sky)\""));
+        let mut free = f64::NEG_INFINITY;
+        let mut names = String::new();
+        for outline in &self.outlines {
+            let mut line = String::new();
+            for (number, [x, y]) in outline.points_mm.iter().enumerate() {
+                let pen = if number == 0 { 'M' } else { 'L' };
+                let _ = write!(line, "{pen}{:.1} {:.1}", view.x(*x), view.y(*y));
+            }
+            let fill = if ["vessel", "other"].contains(&outline.tissue.as_str()) {
+                "lumen"
+            } else {
+                &outline.tissue
+            };
+            let _ = write!(
+                out,
+                "<path d=\"{line}Z\" clip-path=\"url(#frame)\" style=\"fill:var(--{fill},var(--other));stroke:var(--on-tissue);stroke-width:.5\"/>"
+            );
+            // At the right, where its highest point in the picture is.
+            let is_seen = |[x, y]: &&[f64; 2]| {
+                (view.left..view.right).contains(x) && (view.top..view.bottom).contains(y)
+            };
+            let highest = outline.points_mm.iter().filter(is_seen).map(|[_, y]| view.y(*y)).reduce(f64::min);
+            let Some(highest) = highest else { continue };
+            let y = (highest + 16.0).max(free + 16.0);
+            free = y;
+            let _ = write!(
+                names,
+                "<text x={:.1} y={y:.1} text-anchor=end style=\"fill:var(--on-tissue)\">{}</text>",
+                WIDE - 6.0,
+                safe(&outline.name)
+            );
+        }
+        out.push_str(&names);
+    }
+}
+
 fn draw_needle(out: &mut String, needle: &Needle, view: &View) {
     let [length, diameter, bevel] = needle.cannula_mm;
     let (sin, cos) = needle.angle_rad.sin_cos();
@@ -244,6 +303,7 @@ mod tests {
             title: "t".into(),
             bands: vec![band("skin", 0.0), band("fat", 2.0)],
             vessel: Some(Tube { near_mm: 4.8, high_mm: 3.0 }),
+            outlines: Vec::new(),
             ways: vec![way],
             needle: Some(Needle { tip_mm: (8.0, 6.0), angle_rad: 0.5, cannula_mm: [25.0, 0.8, 2.1] }),
         };
