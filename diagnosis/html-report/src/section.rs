@@ -20,6 +20,8 @@ pub struct Band {
     pub name: String,
     /// Depth of its upper face, perpendicular to the skin, mm.
     pub top_mm: f64,
+    /// From where to where along the skin it reaches, mm, if it ends: beside it is the band above.
+    pub reach_mm: Option<[f64; 2]>,
 }
 
 /// A vessel that runs along the section.
@@ -162,19 +164,30 @@ impl Section {
     }
 
     fn draw_tissue(&self, out: &mut String, view: &View) {
-        let rect = |out: &mut String, from: f64, to: f64, fill: &str| {
+        let rect_in = |out: &mut String, [left, right]: [f64; 2], from: f64, to: f64, fill: &str| {
             let _ = write!(
                 out,
-                "<rect x=0 y={:.1} width={WIDE} height={:.1} style=\"fill:var(--{fill},var(--other))\"/>",
+                "<rect x={left:.1} y={:.1} width={:.1} height={:.1} style=\"fill:var(--{fill},var(--other))\"/>",
                 view.y(from),
+                right - left,
                 ((to - from) * view.scale).max(0.0)
             );
         };
+        let rect =
+            |out: &mut String, from: f64, to: f64, fill: &str| rect_in(out, [0.0, WIDE], from, to, fill);
+        let plain = |band: &Band| band.name.chars().filter(char::is_ascii_lowercase).collect::<String>();
         rect(out, view.top, 0.0, "sky");
         for (index, band) in self.bands.iter().enumerate() {
             let end = self.bands.get(index + 1).map_or(view.bottom, |next| next.top_mm);
-            let plain: String = band.name.chars().filter(char::is_ascii_lowercase).collect();
-            rect(out, band.top_mm, end, &plain);
+            let Some(reach_mm) = band.reach_mm else {
+                rect(out, band.top_mm, end, &plain(band));
+                continue;
+            };
+            if let Some(above) = index.checked_sub(1).and_then(|above| self.bands.get(above)) {
+                rect(out, band.top_mm, end, &plain(above));
+            }
+            let ends = reach_mm.map(|mm| view.x(mm).clamp(0.0, WIDE));
+            rect_in(out, ends, band.top_mm, end, &plain(band));
         }
         if let Some(vessel) = self.vessel {
             rect(out, vessel.near_mm, vessel.near_mm + vessel.high_mm, "lumen");
@@ -298,7 +311,7 @@ mod tests {
             points: vec![(0.0, 0.0), (8.0, 6.0)],
             marks: vec![((8.0, 6.0), "end".into())],
         };
-        let band = |name: &str, top_mm| Band { name: name.into(), top_mm };
+        let band = |name: &str, top_mm| Band { name: name.into(), top_mm, reach_mm: None };
         let section = Section {
             title: "t".into(),
             bands: vec![band("skin", 0.0), band("fat", 2.0)],
@@ -316,6 +329,19 @@ mod tests {
         let tip = format!("<polygon points=\"{:.1},{:.1} ", view.x(8.0), view.y(6.0));
         assert!(svg.contains(&tip), "{svg}");
         assert!(svg.contains("4.8 mm") && svg.contains("var(--lumen") && !svg.contains("NaN"));
+        // A bursa from 2 to 5 mm along the skin: muscle is beside it.
+        let bursa = Band { reach_mm: Some([2.0, 5.0]), ..band("bursa", 3.0) };
+        let bands = vec![band("muscle", 0.0), bursa, band("tendon", 5.0)];
+        let ending = Section { bands, ways: section.ways.clone(), ..Section::default() };
+        let (view, svg) = (ending.view(), ending.svg());
+        let bursa = format!(
+            "<rect x={:.1} y={:.1} width={:.1} height={:.1} style=\"fill:var(--bursa",
+            view.x(2.0),
+            view.y(3.0),
+            3.0 * view.scale,
+            2.0 * view.scale
+        );
+        assert!(svg.contains(&bursa) && svg.matches("fill:var(--muscle").count() == 2, "{bursa}: {svg}");
         assert!(Section::default().svg().ends_with("</svg>"), "nothing at all is a drawing too");
     }
 }

@@ -92,6 +92,31 @@ fn beside_the_bursa_the_hand_feels_muscle() {
     assert!((inside - 2.806).abs() < 0.05, "{inside:.3} N in the bursa");
 }
 
+/// Fig. 5 drew that tip in the bursa's band: in the debrief it is in muscle, beside the bursa that
+/// ends at 24.4 mm along the skin.
+#[test]
+fn a_tip_beside_the_bursa_is_drawn_beside_it() {
+    let steps = "entry_deg = 37.0\n[[step]]\nname = \"in\"\npast = \"tendon\"\nby_mm = -2.0\nspeed_mm_s = 6.0\n\
+         [[step]]\nname = \"out\"\nto_mm = -2.0\nspeed_mm_s = 6.0\n";
+    let (file, _) = recorded("audit-drawn", "shoulder", steps, "13");
+    let out = folder("audit-drawn-debrief");
+    run_well(&["debrief", text(&file), "--out", text(&out)]);
+    let page = std::fs::read_to_string(out.join("debrief.html")).expect("written");
+    let section = page.split("<svg").find(|svg| svg.contains("<title>Way of the tip")).expect("a section");
+    let value = |text: &str, key: &str| -> f64 {
+        let rest = text.rsplit_once(key).unwrap_or_else(|| panic!("no {key} in {text}")).1;
+        rest[..rest.find(' ').expect("an end")].parse().expect("a number")
+    };
+    let (bursa, _) = section.split_once("fill:var(--bursa").expect("the bursa is drawn");
+    let bursa = bursa.rsplit_once("<rect").expect("a rectangle").1;
+    let [x, y, width, height] = [" x=", " y=", " width=", " height="].map(|key| value(bursa, key));
+    let tip = section.split_once("<polygon points=\"").expect("a needle").1.split_once(' ').expect("a tip").0;
+    let (tip_x, tip_y) = tip.split_once(',').expect("a place");
+    let (tip_x, tip_y): (f64, f64) = (tip_x.parse().expect("x"), tip_y.parse().expect("y"));
+    assert!((y..y + height).contains(&tip_y), "as deep as the bursa: {tip} and {bursa}");
+    assert!(tip_x > x + width, "beside it: {tip} and {bursa}");
+}
+
 /// Fault 5: in the product's own procedures 97 and 94 % of the longest rest in tissue read as
 /// "puncture". The first tenth of a second is left to the stop.
 #[test]

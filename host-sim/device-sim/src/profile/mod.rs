@@ -154,12 +154,17 @@ impl Profile {
     pub fn scene(&self, source: Source, procedure: Option<String>) -> Scene {
         let ruptures = rupture::ruptures(&self.config.patient, self.entry_rad);
         let sine = libm::sin(self.entry_rad);
+        let goal = self.goal();
         let layers = self.config.patient.layers.iter().enumerate().map(|(index, layer)| SceneLayer {
             name: tissue_name(layer.tissue).to_owned(),
             structure: self.body.as_ref().and_then(|body| body.names.get(index).cloned()),
             is_vessel: layer.tissue == Tissue::Vessel,
             is_far_wall: layer.tissue == Tissue::FarWall,
             depth_mm: layer.depth.0.to_num(),
+            reach_mm: goal.as_ref().filter(|goal| usize::from(goal.layer) == index).and_then(|goal| {
+                let (from, to) = goal.reach_mm?;
+                Some([from, to])
+            }),
             puncture_travel_mm: match layer.wall {
                 Some(wall) => Some(wall.puncture_travel.0.to_num()),
                 None => ruptures.iter().find(|r| r.layer == index).map(|r| r.below_mm / sine),

@@ -180,6 +180,9 @@ pub struct SceneLayer {
     pub is_far_wall: bool,
     /// Depth of its outer face in mm, perpendicular to the skin.
     pub depth_mm: f64,
+    /// From where to where along the skin it reaches, in mm from the point of entry, if it ends.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reach_mm: Option<[f64; 2]>,
     /// The travel along the needle at which its wall gives way, in mm, if it has one.
     pub puncture_travel_mm: Option<f64>,
     /// Part of that which is left when it has just given way, 0 to 1.

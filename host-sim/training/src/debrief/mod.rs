@@ -132,7 +132,11 @@ fn best(attempts: &[Attempt]) -> Option<&Attempt> {
 /// Layers and vessel of a scene as they are drawn on paper.
 pub fn anatomy(scene: &Scene) -> (Vec<Band>, Option<Tube>) {
     let bands = scene.layers.iter().filter(|layer| !layer.is_vessel && !layer.is_far_wall);
-    let bands = bands.map(|layer| Band { name: layer.name.clone(), top_mm: layer.depth_mm });
+    let bands = bands.map(|layer| Band {
+        name: layer.name.clone(),
+        top_mm: layer.depth_mm,
+        reach_mm: layer.reach_mm,
+    });
     (bands.collect(), scene.vessel.as_ref().map(tube))
 }
 
