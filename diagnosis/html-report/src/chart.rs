@@ -94,11 +94,7 @@ impl Chart {
         let _ = write!(out, "<line class=axis x1={LEFT} x2={:.1} y1={zero:.1} y2={zero:.1} />", WIDE - RIGHT);
         self.draw_marks(&mut out, &to_x, &names, top);
         for curve in &self.curves {
-            let dash = if curve.dashed { " dash" } else { "" };
-            let _ = write!(out, "<path class=\"s s{}{dash}\" d=\"", curve.colour);
-            let place = |(x, y): (f64, f64)| (x.is_finite() && y.is_finite()).then(|| (to_x(x), to_y(y)));
-            path(&mut out, thinned(&curve.points, COLUMNS).into_iter().map(place));
-            out.push_str("\"/>");
+            draw_curve(&mut out, curve, &to_x, &to_y);
         }
         let _ = write!(
             out,
@@ -154,6 +150,14 @@ impl Chart {
         let (low, high) = extremes(ys.chain(self.y_includes.iter().copied()).chain([0.0]));
         Scale::rounded(low, high)
     }
+}
+
+fn draw_curve(out: &mut String, curve: &Curve, to_x: &impl Fn(f64) -> f64, to_y: &impl Fn(f64) -> f64) {
+    let dash = if curve.dashed { " dash" } else { "" };
+    let _ = write!(out, "<path class=\"s s{}{dash}\" d=\"", curve.colour);
+    let place = |(x, y): (f64, f64)| (x.is_finite() && y.is_finite()).then(|| (to_x(x), to_y(y)));
+    path(out, thinned(&curve.points, COLUMNS).into_iter().map(place));
+    out.push_str("\"/>");
 }
 
 fn extremes(values: impl Iterator<Item = f64>) -> (f64, f64) {

@@ -69,8 +69,8 @@ fn a_needle_through_the_shoulders_vein_is_in_the_muscle() {
     assert_eq!(reasons, [(&"spared".into(), &true.into())], "{verdict}");
 }
 
-/// Fault 4: 25 mm along the skin, where there is no bursa, the hand got the bursa's force. The law's
-/// forces of muscle and bursa are 2.0 and 2.5 N, with 0.306 N of friction at 6 mm/s.
+/// Fault 4: 25 mm along the skin, where there is no bursa, the hand got the bursa's force. The
+/// law's forces of muscle and bursa are 2.0 and 2.5 N, with 0.306 N of friction at 6 mm/s.
 #[test]
 fn beside_the_bursa_the_hand_feels_muscle() {
     let felt_n = |entry_deg: f64| {

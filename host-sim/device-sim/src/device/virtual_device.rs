@@ -365,7 +365,7 @@ impl VirtualDevice {
     }
 
     /// Returns the tasks that the scripted hand has done since the last time, "bone" where the tip
-    /// has met bone, "slipping" where the rollers did not hold the needle, and [`SLOPE_BARRIER`] where its turning was stopped.
+    /// has met bone, "slipping" where the rollers did not hold the needle, and [`SLOPE_BARRIER`].
     pub fn take_done(&mut self) -> Vec<&'static str> {
         std::mem::take(&mut self.done)
     }

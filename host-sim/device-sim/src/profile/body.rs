@@ -15,8 +15,8 @@ const THINNEST_MM: f64 = 0.2;
 const REACH_MM: f64 = 55.0;
 /// Cartilage over the bone of a joint, mm: an assumption, 1 to 2 mm where it bears load.
 const OVER_BONE_MM: f64 = 1.5;
-/// The wall on the far side of an artery. It is no target and nothing to be spared: whoever comes to
-/// it has entered the artery.
+/// The wall on the far side of an artery. It is no target and nothing to be spared: whoever comes
+/// to it has entered the artery.
 const FAR_ARTERIAL_WALL: &str = "far arterial wall";
 /// Thickness that fat may have, mm.
 const FAT_MM: [f64; 2] = [1.0, 60.0];

@@ -1,9 +1,8 @@
 //! `[force_table]` of a patient, of the law of Paper 000, as `fit-force` writes it.
 
 use super::fix;
-use super::law::mrad;
 use control_core::config::{ForceTable, MAX_ANGLES, MAX_DEPTHS, MAX_LAYERS, MAX_SPEEDS};
-use control_core::units::{MillimetresPerSecond, Stiffness};
+use control_core::units::{MillimetresPerSecond, Milliradians, Stiffness};
 use serde::Deserialize;
 
 /// The largest force that a table holds.
@@ -127,5 +126,14 @@ impl Forces {
             )),
             _ => Err("[force_table] needs either depth_step_mm or depths_mm".into()),
         }
+    }
+}
+
+/// Returns an angle of a file in the control law's unit; `key` as the user wrote it.
+pub(super) fn mrad(key: &str, degrees: f64) -> Result<Milliradians, String> {
+    if (0.0..=180.0).contains(&degrees) {
+        Ok(Milliradians((degrees.to_radians() * 1e3).round() as i16))
+    } else {
+        Err(format!("{key} is {degrees} degrees; it must be from 0 to 180 degrees"))
     }
 }

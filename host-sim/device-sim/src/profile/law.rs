@@ -2,10 +2,10 @@
 //! with its own numbers. Numbers are only taken over here; whether they may run is the control
 //! law's to say.
 
-use super::force_table::Forces;
+use super::force_table::{Forces, mrad};
 use super::{Layer, fix};
 use control_core::config::{Cutting, Fixture, FrictionLaw, Law, Lugre, Sparte};
-use control_core::units::{Damping, Millimetres, MillimetresPerSecond, Milliradians, Newtons, Stiffness};
+use control_core::units::{Damping, Millimetres, MillimetresPerSecond, Newtons, Stiffness};
 use fixed::types::I8F24;
 use serde::Deserialize;
 
@@ -241,14 +241,6 @@ impl Direction {
             per_mrad: Newtons(fix("lateral_n_per_deg", self.lateral_n_per_deg * 1f64.to_degrees() * 1e-3)?),
             largest: mrad("largest_deg", self.largest_deg)?,
         })
-    }
-}
-
-pub(super) fn mrad(key: &str, degrees: f64) -> Result<Milliradians, String> {
-    if (0.0..=180.0).contains(&degrees) {
-        Ok(Milliradians((degrees.to_radians() * 1e3).round() as i16))
-    } else {
-        Err(format!("{key} is {degrees} degrees; it must be from 0 to 180 degrees"))
     }
 }
 

@@ -7,7 +7,6 @@ mod body;
 mod bone;
 mod condition;
 mod entry;
-mod file;
 mod force_table;
 mod goal;
 mod law;
@@ -15,20 +14,25 @@ mod needle;
 mod person;
 mod refusal;
 mod rupture;
+mod scene;
 mod tissues;
 
 use crate::error::Error;
 use crate::named_files::{self, Text};
-use crate::session::{Scene, SceneBeside, SceneLayer, SceneNeedle, SceneVessel, Source, tissue_name};
+use crate::session::tissue_name;
 use control_core::config::{self, Config, Tissue};
-use control_core::{Device, Plan};
+use control_core::units::{FrictionPerMillimetre, JogCompliance, Millimetres, Newtons, Stiffness};
+use control_core::{Device, Patient, Plan};
+use fixed::types::I16F16;
+use force_table::Forces;
+use needle::Needle;
+use person::Thickness;
+use serde::Deserialize;
 
 pub use beside::Beside;
 pub use body::InBody;
 pub(crate) use entry::check_entry;
 pub use entry::{Entry, Slope};
-pub(crate) use file::fix;
-use file::{File, Layer};
 pub use goal::Goal;
 pub use law::Model;
 pub use person::{Difficulty, Person, Sex, Site};
@@ -150,53 +154,6 @@ impl Profile {
         Model::of(&self.config.patient.law)
     }
 
-    /// Returns the scene for a picture.
-    pub fn scene(&self, source: Source, procedure: Option<String>) -> Scene {
-        let ruptures = rupture::ruptures(&self.config.patient, self.entry_rad);
-        let sine = libm::sin(self.entry_rad);
-        let goal = self.goal();
-        let layers = self.config.patient.layers.iter().enumerate().map(|(index, layer)| SceneLayer {
-            name: tissue_name(layer.tissue).to_owned(),
-            structure: self.body.as_ref().and_then(|body| body.names.get(index).cloned()),
-            is_vessel: layer.tissue == Tissue::Vessel,
-            is_far_wall: layer.tissue == Tissue::FarWall,
-            depth_mm: layer.depth.0.to_num(),
-            reach_mm: goal.as_ref().filter(|goal| usize::from(goal.layer) == index).and_then(|goal| {
-                let (from, to) = goal.reach_mm?;
-                Some([from, to])
-            }),
-            puncture_travel_mm: match layer.wall {
-                Some(wall) => Some(wall.puncture_travel.0.to_num()),
-                None => ruptures.iter().find(|r| r.layer == index).map(|r| r.below_mm / sine),
-            },
-            spring_back: layer.wall.map(|wall| wall.spring_back.to_num()),
-            puncture_force_n: match layer.wall {
-                Some(wall) => Some(force_n(&wall.elastic, wall.puncture_travel.0.to_num())),
-                None => ruptures.iter().find(|r| r.layer == index).map(|r| r.force_n),
-            },
-            friction_n_per_mm: layer.friction.0.to_num(),
-        });
-        let deepest_mm = self.config.patient.layers.last().map_or(0.0, |layer| layer.depth.0.to_num::<f64>());
-        Scene {
-            hand: source == Source::Virtual,
-            source,
-            profile: self.name.clone(),
-            procedure,
-            layers: layers.collect(),
-            roller_radius_mm: self.config.device.roller_radius.0.to_num(),
-            travel_mm: self.config.device.limits.travel.0.to_num(),
-            largest_force_n: self.plan.largest_force().0.to_num(),
-            force_scale: self.config.patient.scale.to_num(),
-            tilt_rad: self.tilt_rad(),
-            skin_tilt_rad: self.skin_tilt_rad(),
-            slope_deg: self.slope.map(|slope| [slope.smallest, slope.largest]),
-            vessel: self.vessel().filter(|_| self.body.is_none()),
-            body: self.body.as_ref().map(InBody::scene),
-            beside: self.beside.iter().map(SceneBeside::from).collect(),
-            needle: SceneNeedle::reaching(deepest_mm / libm::sin(self.entry_rad)),
-        }
-    }
-
     /// The same patient with another angle to the skin at entry, 5 to 90° and within its slope.
     pub fn at_angle(self, degrees: f64) -> Result<Self, Error> {
         check_entry("--angle", degrees, self.slope).map_err(Error::input)?;
@@ -246,22 +203,6 @@ impl Profile {
     pub fn tilt_rad(&self) -> f64 {
         self.entry_rad + self.skin_tilt_rad()
     }
-
-    fn vessel(&self) -> Option<SceneVessel> {
-        let layers = &self.config.patient.layers;
-        let depth_mm = |tissue| {
-            let layer = layers.iter().find(|layer| layer.tissue == tissue)?;
-            Some(layer.depth.0.to_num::<f64>())
-        };
-        let (near, far) = (depth_mm(Tissue::Vessel)?, depth_mm(Tissue::FarWall)?);
-        let shape = self.config.patient.vessel;
-        Some(SceneVessel {
-            axis_mm: (near + far) / 2.0,
-            height_mm: far - near,
-            width_mm: shape.map_or(far - near, |shape| shape.width.0.to_num()),
-            offset_mm: shape.map_or(0.0, |shape| shape.offset.0.to_num()),
-        })
-    }
 }
 
 /// Depth in mm along a needle at `angle_rad` to the skin at which the wall of `layer` gives way,
@@ -282,10 +223,172 @@ fn check_vessels(layers: &[Layer]) -> Result<(), String> {
     }
 }
 
-/// `(T − n)²/a + b` of Paper 001, eq. 1, in N; `travel_mm` is T.
-fn force_n(parabola: &config::Parabola, travel_mm: f64) -> f64 {
-    let from_vertex = travel_mm - parabola.vertex.0.to_num::<f64>();
-    from_vertex * from_vertex / parabola.compliance.0.to_num::<f64>() + parabola.base.0.to_num::<f64>()
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    format: u32,
+    name: String,
+    /// Angle of the needle to the skin at entry, 5 to 90 degrees.
+    entry_deg: f64,
+    /// The range of angles to the skin that the device's barrier leaves.
+    slope_deg: Option<Slope>,
+    /// In N; without it, as much as the device gives.
+    largest_force_n: Option<f64>,
+    /// Share of the law's forces that is given to the hand, where the motor is too weak for them.
+    force_scale: Option<f64>,
+    procedure: Option<String>,
+    #[serde(default)]
+    patient: Person,
+    law: Option<law::LawTable>,
+    friction: Option<law::Friction>,
+    needle: Option<Needle>,
+    force_table: Option<Forces>,
+    layer: Vec<Layer>,
+    body: Option<body::Written>,
+    vessel: Option<Vessel>,
+    target: Option<goal::Written>,
+    #[serde(default)]
+    beside: Vec<Beside>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Vessel {
+    /// Across the vessel, mm; its height is from its near to its far wall.
+    width_mm: f64,
+    /// Distance of its axis from the needle's plane, mm.
+    #[serde(default)]
+    offset_mm: f64,
+}
+
+#[derive(Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Layer {
+    tissue: TissueName,
+    /// True if the needle must avoid it; by default as in Paper 002, tendon and cartilage.
+    spare: Option<bool>,
+    /// Perpendicular to the skin; in a body it follows from the line and is in no file.
+    depth_mm: Option<f64>,
+    /// The rule for its thickness; the layers below move with it.
+    thickness: Option<Thickness>,
+    /// Bone lies under it, this far below its top, mm; in a body it follows from the line.
+    over_bone_mm: Option<f64>,
+    wall: Option<Wall>,
+    /// For the jog law.
+    friction_n_per_mm: Option<f64>,
+    /// For the law of Paper 002.
+    cutting: Option<law::Cut>,
+}
+
+#[derive(Clone, Copy, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Wall {
+    /// Force while it is pushed in.
+    elastic: Parabola,
+    /// Travel past contact along the needle at which it gives way, mm.
+    puncture_mm: f64,
+    /// Force from there on.
+    relief: Parabola,
+    /// Slope by which its force falls when the needle is drawn back, N/mm.
+    unload_n_per_mm: f64,
+    /// An assumption where it is left out: nobody gives it.
+    spring_back: Option<f64>,
+}
+
+#[derive(Clone, Copy, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Parabola {
+    /// Travel n at which the force is least, mm; `(T − n)²/a + b` is the force after a travel T.
+    vertex_mm: f64,
+    /// a, mm²/N.
+    compliance_mm2_per_n: f64,
+    /// The least force b, N.
+    base_n: f64,
+}
+
+/// A decimal number as the control law holds it; one that it cannot hold is refused by name.
+pub(crate) fn fix(key: &str, value: f64) -> Result<I16F16, String> {
+    I16F16::checked_from_num(value)
+        .ok_or_else(|| format!("{key} is {value}; it must be a number between -32768 and 32768"))
+}
+
+impl File {
+    fn config(&self) -> Result<Patient, String> {
+        let mut patient = Patient::default();
+        patient.layers.clear();
+        for (layer, depth_mm) in self.layer.iter().zip(person::depths_mm(&self.layer, &self.patient)?) {
+            patient.layers.push(layer.config(depth_mm)?).map_err(|_| {
+                format!("there are {} layers; at most {} are possible", self.layer.len(), config::MAX_LAYERS)
+            })?;
+        }
+        if let Some(force) = self.largest_force_n {
+            patient.largest_force = Some(Newtons(fix("largest_force_n", force)?));
+        }
+        patient.vessel = match &self.vessel {
+            None => None,
+            Some(vessel) => Some(config::Vessel {
+                width: Millimetres(fix("width_mm", vessel.width_mm)?),
+                offset: Millimetres(fix("offset_mm", vessel.offset_mm)?),
+            }),
+        };
+        if let Some(scale) = self.force_scale {
+            patient.scale = fix("force_scale", scale)?;
+        }
+        patient.law = law::law(
+            self.law.as_ref(),
+            self.friction.as_ref(),
+            self.force_table.as_ref(),
+            &self.layer,
+            &patient.law,
+        )?;
+        Ok(patient)
+    }
+}
+
+impl Layer {
+    fn is_spared(&self) -> bool {
+        self.spare.unwrap_or(matches!(self.tissue, TissueName::Tendon | TissueName::Cartilage))
+    }
+
+    /// True if a needle that comes into it from a layer `above` feels no change.
+    fn feels_like(&self, above: &Self) -> bool {
+        let is_like = self.cutting == above.cutting && self.friction_n_per_mm == above.friction_n_per_mm;
+        self.wall.is_none() && !self.is_spared() && is_like
+    }
+
+    fn config(&self, depth_mm: f64) -> Result<config::Layer, String> {
+        let wall = self.wall.as_ref().map(|wall| {
+            Ok::<_, String>(config::Wall {
+                elastic: wall.elastic.config()?,
+                puncture_travel: Millimetres(fix("puncture_mm", wall.puncture_mm)?),
+                relief: wall.relief.config()?,
+                unload: Stiffness(fix("unload_n_per_mm", wall.unload_n_per_mm)?),
+                spring_back: match wall.spring_back {
+                    Some(share) => fix("spring_back", share)?,
+                    None => config::SPRING_BACK,
+                },
+            })
+        });
+        Ok(config::Layer {
+            tissue: self.tissue.into(),
+            depth: Millimetres(fix("depth_mm", depth_mm)?),
+            wall: wall.transpose()?,
+            friction: FrictionPerMillimetre(fix(
+                "friction_n_per_mm",
+                self.friction_n_per_mm.unwrap_or_default(),
+            )?),
+        })
+    }
+}
+
+impl Parabola {
+    fn config(&self) -> Result<config::Parabola, String> {
+        Ok(config::Parabola {
+            vertex: Millimetres(fix("vertex_mm", self.vertex_mm)?),
+            compliance: JogCompliance(fix("compliance_mm2_per_n", self.compliance_mm2_per_n)?),
+            base: Newtons(fix("base_n", self.base_n)?),
+        })
+    }
 }
 
 #[cfg(test)]

@@ -75,10 +75,10 @@ pub(super) enum Thickness {
 /// From skin to muscle over the deltoid on average, mm: Poland et al. 1997, JAMA 277(21):1709.
 const MEAN_MALE_MM: f64 = 8.3;
 const MEAN_FEMALE_MM: f64 = 11.7;
-/// Of that the skin, mm: Laurent 2007.
+/// The skin's part of it, mm: Laurent 2007.
 const SKIN_MM: f64 = 2.5;
-/// Body mass index at which they hold, kg/m². It was the same in both sexes; its value, and that the
-/// fat is in proportion to it, are assumptions.
+/// Body mass index at which they hold, kg/m². It was the same in both sexes; its value, and that
+/// the fat is in proportion to it, are assumptions.
 const MEAN_INDEX: f64 = 26.5;
 
 impl Thickness {

@@ -1,6 +1,6 @@
 //! A refusal of the control law in a person's words.
 
-use super::file::{File, Layer, Wall};
+use super::{File, Layer, Wall};
 use crate::session::tissue_name;
 use control_core::plan::{self, Field};
 use fixed::types::I16F16;

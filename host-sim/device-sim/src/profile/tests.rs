@@ -1,8 +1,7 @@
 //! Profiles that are taken, and what is said of those that are not.
 
 use super::*;
-use control_core::units::Stiffness;
-use fixed::types::I16F16;
+use crate::session::Source;
 
 fn text(text: impl Into<String>) -> Text {
     Text { origin: "test.toml".into(), text: text.into() }
