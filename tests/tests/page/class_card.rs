@@ -1,8 +1,11 @@
 //! The card of a trainee on the page of a class: goal and reasons are read whole, in three
 //! languages, on a desktop, a tablet and a phone.
 
-use crate::needle::{SOON, Size, open, resize};
-use tests::browser::{Chromium, Error, Page, Places, Program, check};
+use crate::needle::{SOON, Size};
+use std::io::{BufRead, BufReader, Write};
+use std::net::{TcpListener, TcpStream};
+use std::path::Path;
+use tests::browser::{Chromium, Error, Page, Places, check};
 
 const SIZES: [Size; 6] = [
     (1440, 900, false),
@@ -12,7 +15,6 @@ const SIZES: [Size; 6] = [
     (390, 844, true),
     (844, 390, true),
 ];
-const PAGE: &str = include_str!("../../../host-sim/page/js/class.html");
 /// Keeps the page's socket, so that a message can be put into it as from the instructor's program.
 const KEEP_SOCKET: &str =
     "WebSocket = class extends WebSocket { constructor(...all) { super(...all); window.socket = this; } };";
@@ -34,9 +36,9 @@ fn visit() -> Result<(), Error> {
     let places = Places::find()?;
     let scratch = places.scratch("page-class")?;
     let browser = Chromium::start(&scratch)?;
-    // Only its files are wanted: the page of a class is written over that of the device.
-    let program = Program::start(&places.program, 0, None)?;
-    let mut page = open(&browser, &program.url, SIZES[0])?;
+    let address = serve()?;
+    let url = format!("http://{address}/class.html");
+    let mut page = Page::open(&browser, &url, SIZES[0].0, SIZES[0].1, SIZES[0].2)?;
     page.before_load(KEEP_SOCKET)?;
     for (language, first, last) in [
         ("en", "the skin was pierced at 45°, not at 10–30°", "the tourniquet was left on"),
@@ -45,16 +47,7 @@ fn visit() -> Result<(), Error> {
     ] {
         page.languages(language)?;
         page.evaluate("window.__old = true, location.reload()")?;
-        page.wait("the page anew", SOON, "!window.__old && document.readyState === 'complete'")?;
-        let html = serde_json::to_string(PAGE).map_err(|cause| Error::from(cause.to_string()))?;
-        page.evaluate(&format!(
-            "window.socket = undefined, document.open(), document.write({html}), document.close()"
-        ))?;
-        page.wait(
-            "the class's page",
-            SOON,
-            "Boolean(window.socket?.onmessage) && Boolean(document.getElementById('cards'))",
-        )?;
+        page.wait("the page anew", SOON, "!window.__old && Boolean(window.socket?.onmessage)")?;
         page.evaluate(MEMBER)?;
         page.wait("a card", SOON, "document.querySelectorAll('.card').length === 1")?;
         let text = page.text("document.querySelector('[data-figure=reasons]').textContent")?;
@@ -64,12 +57,51 @@ fn visit() -> Result<(), Error> {
             &text,
         )?;
         for size in SIZES {
-            resize(&mut page, size)?;
+            page.resize(size.0, size.1, size.2)?;
             is_whole(&mut page, language, size)?;
             page.photograph(&scratch.join(format!("{language}-{}x{}.png", size.0, size.1)))?;
         }
     }
     Ok(())
+}
+
+/// Serves the files of the page, for the program of an instructor is another build. Returns the
+/// address.
+fn serve() -> Result<std::net::SocketAddr, Error> {
+    let listener = TcpListener::bind("127.0.0.1:0").map_err(|cause| cause.to_string())?;
+    let address = listener.local_addr().map_err(|cause| cause.to_string())?;
+    std::thread::spawn(move || {
+        for stream in listener.incoming().flatten() {
+            std::thread::spawn(move || answer(stream));
+        }
+    });
+    Ok(address)
+}
+
+fn answer(mut stream: TcpStream) -> std::io::Result<()> {
+    let mut request = String::new();
+    let mut reader = BufReader::new(stream.try_clone()?);
+    reader.read_line(&mut request)?;
+    let mut header = String::new();
+    while reader.read_line(&mut header)? > 2 {
+        header.clear();
+    }
+    let path = request.split(' ').nth(1).unwrap_or_default().trim_start_matches('/');
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../host-sim/page/js").join(path);
+    let kind = match file.extension().and_then(|end| end.to_str()) {
+        Some("html") => "text/html",
+        Some("js") => "text/javascript",
+        Some("css") => "text/css",
+        Some("svg") => "image/svg+xml",
+        _ => "text/plain",
+    };
+    let (state, body) = std::fs::read(&file).map_or(("404 Not Found", Vec::new()), |body| ("200 OK", body));
+    let length = body.len();
+    write!(
+        stream,
+        "HTTP/1.1 {state}\r\nContent-Type: {kind}; charset=utf-8\r\nContent-Length: {length}\r\nConnection: close\r\n\r\n"
+    )?;
+    stream.write_all(&body)
 }
 
 /// Nothing of goal and reasons is cut off, and nothing is wider than the page.
