@@ -107,7 +107,7 @@ fn answer(mut stream: TcpStream) -> std::io::Result<()> {
 /// Nothing of goal and reasons is cut off, and nothing is wider than the page.
 fn is_whole(page: &mut Page, language: &str, size: Size) -> Result<(), Error> {
     let cut = page.text(
-        "[...document.querySelectorAll('[data-figure=goal], [data-figure=reasons], .card h2, #class-name')] \
+        "[...document.querySelectorAll('[data-figure], .card h2, #class-name')] \
          .filter(e => e.scrollWidth > e.clientWidth + 1 || e.scrollHeight > e.clientHeight + 1) \
          .map(e => e.dataset.figure ?? e.tagName).concat(document.documentElement.scrollWidth > innerWidth ? ['page'] : []).join(' ')",
     )?;
