@@ -218,6 +218,7 @@ fields! {
     FrictionLimitOut: "limit_out_n",
     Vertex: "vertex_mm",
     Sensors: "[sensors]",
+    WallRate: "wall_rate_s_per_mm",
 }
 
 impl fmt::Display for Refusal {

@@ -19,7 +19,7 @@ use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
 /// Version of what follows; a PC refuses another.
-pub const PROTOCOL_VERSION: u16 = 11;
+pub const PROTOCOL_VERSION: u16 = 12;
 /// Samples in a full block: 3.2 ms.
 pub const BLOCK_SAMPLES: usize = 32;
 /// Pose frames a second.

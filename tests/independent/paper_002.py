@@ -15,7 +15,7 @@ SINE = math.sin(math.radians(45.0))
 LUGRE = {"s0": 1.5, "s1": 0.0001, "s2": 0.001, "coulomb": 0.3, "static": 0.35, "stribeck": 2.0}
 
 
-def shoulder(layers=LAYERS, scale=SCALE, skin_wall=True, entry_deg=45.0):
+def shoulder(layers=LAYERS, scale=SCALE, skin_wall=True, entry_deg=45.0, law=""):
     """The text of a profile: the layers of section IV, with or without a wall of skin that gives way at 1 N after 1.2 mm."""
     wall = (
         "[layer.wall]\nelastic = { vertex_mm = 0.0, compliance_mm2_per_n = 1.44, base_n = 0.0 }\npuncture_mm = 1.2\n"
@@ -23,7 +23,7 @@ def shoulder(layers=LAYERS, scale=SCALE, skin_wall=True, entry_deg=45.0):
     )
     text = (
         f'format = 1\nname = "independent"\nentry_deg = {entry_deg}\nforce_scale = {scale}\n'
-        f'[law]\nmodel = "sparte"\ntracking_n_per_mm = {WALL_N_PER_MM}\nrelax_ms = 300\n'
+        f'[law]\nmodel = "sparte"\ntracking_n_per_mm = {WALL_N_PER_MM}\nrelax_ms = 300\n{law}'
         f"[law.friction]\nstiffness_n_per_mm = {LUGRE['s0']}\ndamping_n_s_per_mm = {LUGRE['s1']}\nviscous_n_s_per_mm = {LUGRE['s2']}\n"
         f"sliding_n = {LUGRE['coulomb']}\nsticking_n = {LUGRE['static']}\nstribeck_mm_s = {LUGRE['stribeck']}\n"
         "[law.fixture]\nlateral_n_per_deg = 0.2\nlargest_deg = 10.0\n"
@@ -141,6 +141,28 @@ def skin_pushed_in(device, report):
     report.holds("then it falls sharply, below the cutting force", 0.3 < after < 0.8 and after < 0.65 * peak, f"{peak:.3f} N, then {after:.3f} N")
 
 
+def rate_before_the_puncture(device, report):
+    """A viscoelastic skin: the polynomial times 1 + rate * speed (Hunt and Crossley 1975); without the key, the polynomial alone."""
+    for rate in (0.0, 0.015):
+        law = f"wall_rate_s_per_mm = {rate}\n" if rate else ""
+        for speed in (2.0, 12.0):
+            steps = [f"to_mm = 3.0\nspeed_mm_s = {speed}", "to_mm = -1.0\nspeed_mm_s = 6.0"]
+            patient = shoulder((("skin", 0.0, 0.8), ("muscle", 40.0, 2.0)), entry_deg=90.0, law=law)
+            recording = device.record(patient, hand(steps), 0.5 + 4.0 / speed + 0.7)
+            rows = recording.way_in()
+            depth, force = recording.depth_mm[rows], recording.force_n[rows] / SCALE
+            # 1 N after 1.2 mm; the needle's own speed, for the hand gives way to the skin. The first tenths of a mm are left to the device's
+            # estimate of the speed, which it takes over some counts.
+            way = way_between_counts(depth)
+            width = round(0.3 / speed / TICK_S)
+            moved = numpy.full(len(way), numpy.nan)
+            moved[width:] = (way[width:] - way[:-width]) / (width * TICK_S)
+            pushing = (depth > 0.6) & (depth < 1.15)
+            wanted = depth**2 / 1.44 * (1.0 + rate * moved)
+            difference = (force - wanted)[pushing]
+            report.within(f"a skin with a rate of {rate:g} s/mm at {speed:g} mm/s, rms", math.sqrt((difference**2).mean()), 0.010, "N")
+
+
 def a_needle_that_stops(device, report):
     """The wall is "smoothly updated to the needle's last position": the patient's 300 ms, until friction holds the needle alone."""
     steps = ["to_mm = 22.0\nspeed_mm_s = 6.0", "seconds = 2.5", "to_mm = -1.0\nspeed_mm_s = 6.0"]
@@ -177,6 +199,7 @@ def direction(device, report):
 
 def check(device, report):
     skin_pushed_in(device, report)
+    rate_before_the_puncture(device, report)
     periodic_penetration(device, report)
     straight_injection(device, report)
     a_needle_that_stops(device, report)

@@ -76,6 +76,7 @@ pub fn sparte(count: usize) -> Config {
             speed: MillimetresPerSecond(q(2.0)),
         },
         fixture: Fixture { per_mrad: Newtons(q(0.01)), largest: Milliradians(200) },
+        wall_rate: q(0.005),
     });
     config
 }

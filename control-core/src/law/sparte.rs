@@ -5,6 +5,9 @@
 //! holds the direction of entry: its lateral force is computed and reported only, because this
 //! device turns freely.
 //!
+//! A wall that is pushed in may resist more the faster it is pushed in (Hunt and Crossley 1975,
+//! J Appl Mech 42:440): `F = f(T)·(1 + λv)`, which begins at no force and gives no energy back.
+//!
 //! Tracking wall: `z = x − w`, `w` dragged so that `−F_out/K ≤ z ≤ F_in/K`, `F = K·z`. A needle
 //! that has not gone on for 20 ms has stopped: `w` comes after it with a time constant until only
 //! the friction that holds the needle is left, and makes up for those 20 ms 20 ms later: a needle
@@ -41,7 +44,7 @@ const GOES_ON: I16F16 = I16F16::from_bits(9_830);
 const LARGEST_STEP: i32 = 16 << 16;
 /// Faster than this no law is held to what the motor gives: 50 mm/s.
 const FASTEST: I16F16 = I16F16::from_bits(50 << 16);
-/// Faster than this the friction grows no more: 1,000 mm/s.
+/// Faster than this no force grows: 1,000 mm/s.
 const LARGEST_SPEED: i32 = 1_000 << 16;
 /// The barrier is reported again once the needle was turned back to this share of the largest
 /// angle, in 256ths.
@@ -63,6 +66,9 @@ pub struct Sparte {
     pub friction: Lugre,
     /// The fixture that holds the direction of entry.
     pub fixture: Fixture,
+    /// λ of Hunt and Crossley, s/mm: at v mm/s a wall that is pushed in resists with 1 + λv times
+    /// its force. At most 0.05, and so much that λ times the wall's force is 0.02 N·s/mm.
+    pub wall_rate: I16F16,
 }
 
 /// The force of cutting in one layer.
@@ -205,7 +211,10 @@ impl Memory {
         let step =
             depth.0.to_bits().wrapping_sub(self.last_depth.0.to_bits()).clamp(-LARGEST_STEP, LARGEST_STEP);
         self.last_depth = depth;
+        let speed = speed.0.clamp(I16F16::from_bits(-LARGEST_SPEED), I16F16::from_bits(LARGEST_SPEED));
         let pressed = pressed(prepared, met, depth);
+        let elastic = pressed.unwrap_or_default();
+        let rate = rate_force(elastic, speed.to_bits(), config.wall_rate);
         if met.given() < prepared.walls_that_close || depth.0 < met.top(0) {
             self.wall.release(depth);
             self.bristles = I8F24::ZERO;
@@ -214,10 +223,9 @@ impl Memory {
             self.is_beyond = false;
             self.given = met.given();
             let state = if pressed.is_some() { State::Elastic } else { State::Approach };
-            let force = Elements { walls: Newtons(pressed.unwrap_or_default()), ..Elements::NONE };
+            let force = Elements { walls: Newtons(elastic), friction: Newtons(rate) };
             return Response { force, state, ..Response::NONE };
         }
-        let elastic = pressed.unwrap_or_default();
         let cut = prepared.cuts.get(met.innermost(depth)).copied().unwrap_or_default();
         if met.given() > self.given {
             let left = truncating_product(cut.inwards.0.to_bits(), config.after_puncture.to_bits(), 16);
@@ -226,7 +234,7 @@ impl Memory {
         }
         self.given = met.given();
         let (cutting, is_full) = self.track(config, prepared, cut, elastic, (depth, movement));
-        let friction = self.rub(&prepared.rub, step, speed);
+        let friction = self.rub(&prepared.rub, step, speed.to_bits()).saturating_add(rate);
         let (lateral, barrier) = self.hold_direction(&config.fixture, met.angle());
         let state = if movement.direction() == Direction::Out {
             State::Withdrawal
@@ -287,10 +295,8 @@ impl Memory {
         Some(1 + i32::from((1..=CATCH_UP_TICKS).contains(&left)))
     }
 
-    /// LuGre over a step of `step` mm, in Q16.
-    fn rub(&mut self, rub: &Rub, step: i32, speed: MillimetresPerSecond) -> I16F16 {
-        let speed =
-            speed.0.clamp(I16F16::from_bits(-LARGEST_SPEED), I16F16::from_bits(LARGEST_SPEED)).to_bits();
+    /// LuGre over a step of `step` mm at `speed` mm/s, both in Q16.
+    fn rub(&mut self, rub: &Rub, step: i32, speed: i32) -> I16F16 {
         let level = rub.level(speed);
         if step != 0 {
             let stretched = truncating_product(step.abs(), rub.stiffness.to_bits(), 16);
@@ -340,6 +346,12 @@ fn pressed(prepared: &PreparedSparte, met: &Insertion, depth: Millimetres) -> Op
     (travel >= I16F16::ZERO).then(|| wall.elastic_force(travel).0)
 }
 
+/// `λv·f` of a wall that resists with f, at `speed` mm/s in Q16; it takes no more than f away.
+fn rate_force(wall: I16F16, speed: i32, rate: I16F16) -> I16F16 {
+    let share = truncating_product(speed, rate.to_bits(), 16).max(-1 << 16);
+    I16F16::from_bits(truncating_product(wall.to_bits(), share, 16))
+}
+
 fn check(sparte: &Sparte, limits: &ForceLimits) -> Result<(), Refusal> {
     let (stiff, largest) = (limits.stiffest, limits.largest);
     let rub = &sparte.friction;
@@ -368,8 +380,12 @@ fn check(sparte: &Sparte, limits: &ForceLimits) -> Result<(), Refusal> {
         for force in [cut.inwards.0, cut.outwards.0] {
             within(Field::CuttingForce, force, I16F16::ZERO, milli(100_000))?;
         }
-        let peak = layer.wall.map(|wall| wall::Parabola::new(&wall.elastic).force(wall.puncture_travel).0);
-        let strongest = cut.inwards.0.max(cut.outwards.0).max(peak.unwrap_or_default()).max(before);
+        let peak = layer.wall.as_ref().map(wall::peak).unwrap_or_default();
+        // No more damping than `viscous` may give.
+        let most = milli(20).saturating_div(peak.max(milli(400)));
+        within(Field::WallRate, sparte.wall_rate, I16F16::ZERO, most)?;
+        let peak = peak.saturating_add(peak.saturating_mul(sparte.wall_rate.saturating_mul(FASTEST)));
+        let strongest = cut.inwards.0.max(cut.outwards.0).max(peak).max(before);
         before = cut.inwards.0;
         let force = strongest.saturating_add(rubbing);
         if force > largest {

@@ -82,6 +82,7 @@ pub(crate) fn shoulder() -> Config {
             speed: MillimetresPerSecond(q(2.0)),
         },
         fixture: Fixture { per_mrad: n(0.01), largest: Milliradians(200) },
+        wall_rate: I16F16::ZERO,
     });
     config.patient.scale = q(0.6);
     config.device.limits.stiffness = Stiffness(q(2.5));
@@ -105,6 +106,37 @@ fn every_layer_is_cut_at_the_force_of_the_paper() {
         let got = force(&needle.tick());
         assert!((got - cutting - sliding).abs() < 0.02, "{mm} mm: {got} N, not {cutting} + {sliding}");
     }
+}
+
+/// Force at 2 mm in skin of 1.2 N/(3 mm)², which is pushed in at a speed with λ, N.
+fn pushed_in_at(mm_per_s: f64, rate: f64) -> f64 {
+    let mut config = shoulder();
+    sparte(&mut config).wall_rate = q(rate);
+    let mut needle = Needle::new(&config, STRAIGHT);
+    needle.go(2.0, mm_per_s, |_| ());
+    force(&needle.tick())
+}
+
+/// Hunt and Crossley 1975: `F = f(T)·(1 + λv)`, here `1.2·(2/3)² = 0.533 N` times that.
+#[test]
+fn a_wall_that_is_pushed_in_resists_by_its_rate() {
+    let slowly = 1.2 * (2.0_f64 / 3.0).powi(2);
+    for mm_per_s in [1.0, 5.0, 20.0] {
+        assert!((pushed_in_at(mm_per_s, 0.0) - slowly).abs() < 0.015, "no rate unless it is asked for");
+        let (got, wanted) = (pushed_in_at(mm_per_s, 0.008), slowly * (1.0 + 0.008 * mm_per_s));
+        assert!((got - wanted).abs() < 0.02, "{mm_per_s} mm/s: {got} N, not {wanted} N");
+    }
+    // It begins at no force, and a needle that stops feels what it feels without a rate.
+    let mut config = shoulder();
+    sparte(&mut config).wall_rate = q(0.008);
+    let mut needle = Needle::new(&config, STRAIGHT);
+    let (mut largest_step, mut before) = (0.0_f64, 0.0);
+    needle.go(2.0, 20.0, |out| {
+        largest_step = largest_step.max((force(out) - std::mem::replace(&mut before, force(out))).abs());
+    });
+    assert!(largest_step < 0.02, "a step of {largest_step} N");
+    needle.rest(0.2);
+    assert!((force(&needle.tick()) - slowly).abs() < 0.015, "at rest {} N", force(&needle.tick()));
 }
 
 #[test]
@@ -263,6 +295,9 @@ fn each_value_has_a_range() {
     assert_eq!(field(&|s| s.fixture.largest = Milliradians(0)), Some(Field::LargestAngle));
     assert_eq!(field(&|s| s.cutting[2].outwards = n(-0.1)), Some(Field::CuttingForce));
     assert_eq!(field(&|s| s.cutting.truncate(5)), Some(Field::CuttingForce));
+    // The bursa gives way at 2.4 N: 0.02 N·s/mm are 0.0083 s/mm of that.
+    assert_eq!(field(&|s| s.wall_rate = q(0.0085)), Some(Field::WallRate));
+    assert_eq!(field(&|s| s.wall_rate = q(-0.001)), Some(Field::WallRate));
     let mut config = shoulder();
     config.patient.scale = q(0.09);
     assert!(matches!(config.plan().err(), Some(Refusal::OutOfRange { field: Field::Scale, .. })));
@@ -284,6 +319,7 @@ proptest! {
         extra in 0.0..0.2_f64,
         relax_ms in 10..2_000_u16,
         speed in 0.2..20.0_f64,
+        rate in prop_oneof![Just(0.0), 0.0..0.008_f64],
     ) {
         let mut config = shoulder();
         let law = sparte(&mut config);
@@ -292,6 +328,7 @@ proptest! {
         law.friction.stiffness.0 = q(stiffness);
         (law.friction.sliding, law.friction.sticking) = (n(sliding), n(sliding + extra));
         law.friction.speed.0 = q(speed);
+        law.wall_rate = q(rate);
         prop_assume!(config.plan().is_ok());
         let (mut needle, mut twin) = (Needle::new(&config, STRAIGHT), Twin::new(&config));
         let mut worst = 0.0_f64;

@@ -12,6 +12,8 @@ const RIGHT: f64 = 10.0;
 const BOTTOM: f64 = 44.0;
 /// A legend's line.
 const LINE: f64 = 20.0;
+/// A row of names of marks.
+const NAME: f64 = 18.0;
 /// Columns of a curve: more are not seen.
 const COLUMNS: usize = 600;
 
@@ -41,6 +43,8 @@ pub struct Chart {
     pub curves: Vec<Curve>,
     /// Places along x that have a name.
     pub marks: Vec<(f64, String)>,
+    /// From where to where along x the frame is shaded.
+    pub zone: Option<(f64, f64)>,
     /// Values of y that are always shown; 0 is.
     pub y_includes: Vec<f64>,
 }
@@ -51,14 +55,20 @@ impl Chart {
         let (x, y) = (self.x_range(), self.y_range());
         let named: Vec<&Curve> = self.curves.iter().filter(|c| !c.name.is_empty()).collect();
         let legend = legend_rows(&named);
-        let top = 26.0 + LINE * legend.len() as f64 + if self.marks.is_empty() { 0.0 } else { 18.0 };
+        let to_x = |v: f64| LEFT + (v - x.low) / (x.high - x.low) * (WIDE - LEFT - RIGHT);
+        let names = self.place_names(&to_x);
+        let rows = names.iter().map(|(_, row)| row + 1).max().unwrap_or(0);
+        let top = 26.0 + LINE * legend.len() as f64 + NAME * rows as f64;
         let total = top + HIGH + BOTTOM;
         let mut out = format!("<svg viewBox=\"0 0 {WIDE} {total}\" role=img>");
         let _ = write!(out, "<title>{}</title>", safe(&self.title));
         let _ = write!(out, "<text class=title x={LEFT} y=16>{}</text>", safe(&self.title));
         draw_legend(&mut out, &legend);
-        let to_x = |v: f64| LEFT + (v - x.low) / (x.high - x.low) * (WIDE - LEFT - RIGHT);
         let to_y = |v: f64| top + (y.high - v) / (y.high - y.low) * HIGH;
+        if let Some((from, to)) = self.zone {
+            let (from, wide) = (to_x(from), to_x(to) - to_x(from));
+            let _ = write!(out, "<rect class=zone x={from:.1} y={top:.1} width={wide:.1} height={HIGH} />");
+        }
         for value in y.ticks() {
             let at = to_y(value);
             let _ = write!(
@@ -82,13 +92,9 @@ impl Chart {
         }
         let zero = to_y(0.0_f64.clamp(y.low, y.high));
         let _ = write!(out, "<line class=axis x1={LEFT} x2={:.1} y1={zero:.1} y2={zero:.1} />", WIDE - RIGHT);
-        self.draw_marks(&mut out, &to_x, top);
+        self.draw_marks(&mut out, &to_x, &names, top);
         for curve in &self.curves {
-            let dash = if curve.dashed { " dash" } else { "" };
-            let _ = write!(out, "<path class=\"s s{}{dash}\" d=\"", curve.colour);
-            let place = |(x, y): (f64, f64)| (x.is_finite() && y.is_finite()).then(|| (to_x(x), to_y(y)));
-            path(&mut out, thinned(&curve.points, COLUMNS).into_iter().map(place));
-            out.push_str("\"/>");
+            draw_curve(&mut out, curve, &to_x, &to_y);
         }
         let _ = write!(
             out,
@@ -103,23 +109,33 @@ impl Chart {
         out
     }
 
-    fn draw_marks(&self, out: &mut String, to_x: &impl Fn(f64) -> f64, top: f64) {
-        let mut free = LEFT;
-        for (value, name) in &self.marks {
-            let at = to_x(*value);
-            let _ = write!(out, "<line class=mark x1={at:.1} x2={at:.1} y1={top:.1} y2={:.1} />", top + HIGH);
-            // A name that would run into the one before it is left out; the line stays.
+    /// Returns the middle of each mark's name, and its row above the frame: a name that would run
+    /// into another goes a row higher.
+    fn place_names(&self, to_x: &impl Fn(f64) -> f64) -> Vec<(f64, usize)> {
+        let mut free: Vec<f64> = Vec::new();
+        let place = |(value, name): &(f64, String)| {
             let half = 3.7 * name.chars().count() as f64;
-            let middle = at.clamp(LEFT + half, WIDE - RIGHT - half);
-            if middle - half >= free {
-                let _ = write!(
-                    out,
-                    "<text x={middle:.1} y={:.1} text-anchor=middle>{}</text>",
-                    top - 5.0,
-                    safe(name)
-                );
-                free = middle + half + 6.0;
+            let middle = to_x(*value).clamp(LEFT + half, (WIDE - RIGHT - half).max(LEFT + half));
+            let row = free.iter().position(|free| middle - half >= *free).unwrap_or(free.len());
+            if row == free.len() {
+                free.push(LEFT);
             }
+            free[row] = middle + half + 6.0;
+            (middle, row)
+        };
+        self.marks.iter().map(place).collect()
+    }
+
+    fn draw_marks(&self, out: &mut String, to_x: &impl Fn(f64) -> f64, names: &[(f64, usize)], top: f64) {
+        for ((value, name), (middle, row)) in self.marks.iter().zip(names) {
+            let (at, y) = (to_x(*value), top - 5.0 - NAME * *row as f64);
+            let _ = write!(
+                out,
+                "<line class=mark x1={at:.1} x2={at:.1} y1={:.1} y2={:.1} /><text x={middle:.1} y={y:.1} text-anchor=middle>{}</text>",
+                y + 3.0,
+                top + HIGH,
+                safe(name)
+            );
         }
     }
 
@@ -134,6 +150,14 @@ impl Chart {
         let (low, high) = extremes(ys.chain(self.y_includes.iter().copied()).chain([0.0]));
         Scale::rounded(low, high)
     }
+}
+
+fn draw_curve(out: &mut String, curve: &Curve, to_x: &impl Fn(f64) -> f64, to_y: &impl Fn(f64) -> f64) {
+    let dash = if curve.dashed { " dash" } else { "" };
+    let _ = write!(out, "<path class=\"s s{}{dash}\" d=\"", curve.colour);
+    let place = |(x, y): (f64, f64)| (x.is_finite() && y.is_finite()).then(|| (to_x(x), to_y(y)));
+    path(out, thinned(&curve.points, COLUMNS).into_iter().map(place));
+    out.push_str("\"/>");
 }
 
 fn extremes(values: impl Iterator<Item = f64>) -> (f64, f64) {
@@ -235,6 +259,36 @@ mod tests {
         let svg = Chart { curves: vec![curve], ..Chart::default() }.svg();
         let path = svg.rsplit_once("class=\"s s0\" d=\"").expect("a curve").1;
         assert_eq!(path.split('"').next().expect("its path").matches('M').count(), 2);
+    }
+
+    /// The marks of Paper 002's Fig. 6, whose layers are met within a second.
+    #[test]
+    fn every_mark_has_its_name_and_none_runs_into_another() {
+        let names = ["skin", "fat", "muscle", "bursa", "tendon", "cartilage", "withdrawal"];
+        let marks = names.iter().zip(0..).map(|(name, at)| (0.2 * f64::from(at), (*name).to_owned()));
+        let curve = Curve { points: vec![(0.0, 0.0), (10.0, 1.0)], ..Curve::default() };
+        let chart = Chart {
+            curves: vec![curve],
+            marks: marks.collect(),
+            zone: Some((5.0, 10.0)),
+            ..Chart::default()
+        };
+        let svg = chart.svg();
+        let mut placed: Vec<(f64, f64, f64)> = Vec::new();
+        for name in names {
+            let before = svg.split_once(&format!(" text-anchor=middle>{name}<")).expect(name).0;
+            let (x, y) = before.rsplit_once("<text x=").expect(name).1.split_once(" y=").expect(name);
+            let (x, y): (f64, f64) = (x.parse().expect("x"), y.parse().expect("y"));
+            let half = 3.7 * name.len() as f64;
+            assert!(y > 16.0 && x - half >= 0.0 && x + half <= WIDE, "{name} at {x}, {y}");
+            for (other_x, other_y, other_half) in &placed {
+                assert!((y - other_y).abs() > 10.0 || (x - other_x).abs() >= half + other_half, "{name}");
+            }
+            placed.push((x, y, half));
+        }
+        // Half of the frame.
+        let zone = format!("<rect class=zone x={:.1} ", LEFT + (WIDE - LEFT - RIGHT) / 2.0);
+        assert!(svg.contains(&zone), "{svg}");
     }
 
     #[test]

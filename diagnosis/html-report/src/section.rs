@@ -20,6 +20,8 @@ pub struct Band {
     pub name: String,
     /// Depth of its upper face, perpendicular to the skin, mm.
     pub top_mm: f64,
+    /// From where to where along the skin it reaches, mm, if it ends: beside it is the band above.
+    pub reach_mm: Option<[f64; 2]>,
 }
 
 /// A vessel that runs along the section.
@@ -29,6 +31,17 @@ pub struct Tube {
     pub near_mm: f64,
     /// From near to far wall, mm.
     pub high_mm: f64,
+}
+
+/// A structure of a body, cut.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Outline {
+    /// Its name.
+    pub name: String,
+    /// The tissue that sets its colour.
+    pub tissue: String,
+    /// A closed line, along the section and below the point of entry, mm.
+    pub points_mm: Vec<[f64; 2]>,
 }
 
 /// A way of the tip.
@@ -64,6 +77,8 @@ pub struct Section {
     pub bands: Vec<Band>,
     /// The vessel, if there is one.
     pub vessel: Option<Tube>,
+    /// The structures of a body, each painted over those before it, instead of level layers.
+    pub outlines: Vec<Outline>,
     /// The last on top.
     pub ways: Vec<Way>,
     /// The needle, if there is one, as far as the picture reaches.
@@ -108,7 +123,11 @@ impl Section {
                 safe(&way.name)
             );
         }
-        self.draw_tissue(&mut out, &view);
+        if self.outlines.is_empty() {
+            self.draw_tissue(&mut out, &view)
+        } else {
+            self.draw_body(&mut out, &view)
+        }
         if let Some(needle) = &self.needle {
             draw_needle(&mut out, needle, &view);
         }
@@ -145,19 +164,30 @@ impl Section {
     }
 
     fn draw_tissue(&self, out: &mut String, view: &View) {
-        let rect = |out: &mut String, from: f64, to: f64, fill: &str| {
+        let rect_in = |out: &mut String, [left, right]: [f64; 2], from: f64, to: f64, fill: &str| {
             let _ = write!(
                 out,
-                "<rect x=0 y={:.1} width={WIDE} height={:.1} style=\"fill:var(--{fill},var(--other))\"/>",
+                "<rect x={left:.1} y={:.1} width={:.1} height={:.1} style=\"fill:var(--{fill},var(--other))\"/>",
                 view.y(from),
+                right - left,
                 ((to - from) * view.scale).max(0.0)
             );
         };
+        let rect =
+            |out: &mut String, from: f64, to: f64, fill: &str| rect_in(out, [0.0, WIDE], from, to, fill);
+        let plain = |band: &Band| band.name.chars().filter(char::is_ascii_lowercase).collect::<String>();
         rect(out, view.top, 0.0, "sky");
         for (index, band) in self.bands.iter().enumerate() {
             let end = self.bands.get(index + 1).map_or(view.bottom, |next| next.top_mm);
-            let plain: String = band.name.chars().filter(char::is_ascii_lowercase).collect();
-            rect(out, band.top_mm, end, &plain);
+            let Some(reach_mm) = band.reach_mm else {
+                rect(out, band.top_mm, end, &plain(band));
+                continue;
+            };
+            if let Some(above) = index.checked_sub(1).and_then(|above| self.bands.get(above)) {
+                rect(out, band.top_mm, end, &plain(above));
+            }
+            let ends = reach_mm.map(|mm| view.x(mm).clamp(0.0, WIDE));
+            rect_in(out, ends, band.top_mm, end, &plain(band));
         }
         if let Some(vessel) = self.vessel {
             rect(out, vessel.near_mm, vessel.near_mm + vessel.high_mm, "lumen");
@@ -186,6 +216,48 @@ impl Section {
             );
         }
         debug_assert!(view.right > view.left);
+    }
+}
+
+impl Section {
+    fn draw_body(&self, out: &mut String, view: &View) {
+        let high = (view.bottom - view.top) * view.scale;
+        let frame = |fill: &str| format!("x=0 y={:.1} width={WIDE} height={high:.1} {fill}/>", view.head);
+        let _ = write!(out, "<clipPath id=frame><rect {}</clipPath>", frame(""));
+        let _ = write!(out, "<rect {}", frame("style=\"fill:var(--sky)\""));
+        let mut free = f64::NEG_INFINITY;
+        let mut names = String::new();
+        for outline in &self.outlines {
+            let mut line = String::new();
+            for (number, [x, y]) in outline.points_mm.iter().enumerate() {
+                let pen = if number == 0 { 'M' } else { 'L' };
+                let _ = write!(line, "{pen}{:.1} {:.1}", view.x(*x), view.y(*y));
+            }
+            let fill = if ["vessel", "other"].contains(&outline.tissue.as_str()) {
+                "lumen"
+            } else {
+                &outline.tissue
+            };
+            let _ = write!(
+                out,
+                "<path d=\"{line}Z\" clip-path=\"url(#frame)\" style=\"fill:var(--{fill},var(--other));stroke:var(--on-tissue);stroke-width:.5\"/>"
+            );
+            // At the right, where its highest point in the picture is.
+            let is_seen = |[x, y]: &&[f64; 2]| {
+                (view.left..view.right).contains(x) && (view.top..view.bottom).contains(y)
+            };
+            let highest = outline.points_mm.iter().filter(is_seen).map(|[_, y]| view.y(*y)).reduce(f64::min);
+            let Some(highest) = highest else { continue };
+            let y = (highest + 16.0).max(free + 16.0);
+            free = y;
+            let _ = write!(
+                names,
+                "<text x={:.1} y={y:.1} text-anchor=end style=\"fill:var(--on-tissue)\">{}</text>",
+                WIDE - 6.0,
+                safe(&outline.name)
+            );
+        }
+        out.push_str(&names);
     }
 }
 
@@ -239,11 +311,12 @@ mod tests {
             points: vec![(0.0, 0.0), (8.0, 6.0)],
             marks: vec![((8.0, 6.0), "end".into())],
         };
-        let band = |name: &str, top_mm| Band { name: name.into(), top_mm };
+        let band = |name: &str, top_mm| Band { name: name.into(), top_mm, reach_mm: None };
         let section = Section {
             title: "t".into(),
             bands: vec![band("skin", 0.0), band("fat", 2.0)],
             vessel: Some(Tube { near_mm: 4.8, high_mm: 3.0 }),
+            outlines: Vec::new(),
             ways: vec![way],
             needle: Some(Needle { tip_mm: (8.0, 6.0), angle_rad: 0.5, cannula_mm: [25.0, 0.8, 2.1] }),
         };
@@ -256,6 +329,19 @@ mod tests {
         let tip = format!("<polygon points=\"{:.1},{:.1} ", view.x(8.0), view.y(6.0));
         assert!(svg.contains(&tip), "{svg}");
         assert!(svg.contains("4.8 mm") && svg.contains("var(--lumen") && !svg.contains("NaN"));
+        // A bursa from 2 to 5 mm along the skin: muscle is beside it.
+        let bursa = Band { reach_mm: Some([2.0, 5.0]), ..band("bursa", 3.0) };
+        let bands = vec![band("muscle", 0.0), bursa, band("tendon", 5.0)];
+        let ending = Section { bands, ways: section.ways.clone(), ..Section::default() };
+        let (view, svg) = (ending.view(), ending.svg());
+        let bursa = format!(
+            "<rect x={:.1} y={:.1} width={:.1} height={:.1} style=\"fill:var(--bursa",
+            view.x(2.0),
+            view.y(3.0),
+            3.0 * view.scale,
+            2.0 * view.scale
+        );
+        assert!(svg.contains(&bursa) && svg.matches("fill:var(--muscle").count() == 2, "{bursa}: {svg}");
         assert!(Section::default().svg().ends_with("</svg>"), "nothing at all is a drawing too");
     }
 }

@@ -31,8 +31,8 @@ pub fn empty(mut transmit: impl FnMut(&mut [u8; MAX_FRAME]) -> usize, mut take: 
 }
 
 /// Moves a device and the driver of its link on by one exchange, with the needle that is followed
-/// in the patient: it tells where bone stops the tip. `hear` gets every byte that the device sends,
-/// `see` every frame.
+/// in the patient: it tells where bone stops the tip and barriers stop its turning. `hear` gets
+/// every byte that the device sends, `see` every frame.
 pub fn exchange(
     device: &mut VirtualDevice,
     driver: &mut Driver,
@@ -58,5 +58,6 @@ pub fn exchange(
     if let Some(needle) = needle {
         driver.follow(now, needle);
         device.meet_bone(needle.track().bone_mm());
+        device.limit_tilt(needle.tilt_limits());
     }
 }

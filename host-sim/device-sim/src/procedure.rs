@@ -8,7 +8,7 @@ pub mod purpose;
 use crate::error::Error;
 use crate::named_files::{self, Text};
 use crate::plant::hand::Grip;
-use crate::profile::{self, Entry, Profile, TissueName, puncture_path_mm};
+use crate::profile::{self, Entry, Profile, TissueName, check_entry, puncture_path_mm};
 use control_core::config::Tissue;
 use purpose::Purpose;
 use serde::Deserialize;
@@ -223,7 +223,7 @@ impl File {
         }
         let travel = profile.config.device.limits.travel.0.to_num::<f64>();
         within("start_mm", self.start_mm, -travel, travel)?;
-        self.entry_deg.map_or(Ok(()), |deg| within("entry_deg", deg, 5.0, 90.0))?;
+        self.entry_deg.map_or(Ok(()), |deg| check_entry("entry_deg", deg, profile.slope))?;
         within("stiffness_n_per_mm", self.hand.stiffness_n_per_mm, 0.05, 10.0)?;
         within("damping_n_s_per_mm", self.hand.damping_n_s_per_mm, 0.0, 0.1)?;
         within("tremor_mm", self.hand.tremor_mm, 0.0, 2.0)?;

@@ -56,6 +56,8 @@ export class Hand {
     this.movable = scene.hand;
     this.source = scene.source.kind;
     this.skinTilt = scene.skin_tilt_rad;
+    // Between the barriers, if the device has any.
+    [this.angle.min, this.angle.max] = scene.slope_deg ?? [0, 90];
     this.deepest = Math.min(scene.travel_mm, scene.needle.length_mm);
     document.getElementById("turn").hidden = !this.movable;
     this.zero.hidden = this.source === "recording";

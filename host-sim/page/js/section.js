@@ -153,6 +153,14 @@ export class Section {
     for (let i = 0; i < bands.length; i++) {
       const top = bands[i].depth_mm;
       const end = i + 1 < bands.length ? bands[i + 1].depth_mm : bottom;
+      // One that ends has the layer above beside it.
+      const reach = bands[i].reach_mm;
+      g.save();
+      if (reach) {
+        g.beginPath();
+        g.rect(this.x(reach[0]), -99, (reach[1] - reach[0]) * this.scale, height + 198);
+        g.clip();
+      }
       g.beginPath();
       this.level(g, tissue, top, width);
       g.lineTo(width + 99, height + 99);
@@ -175,6 +183,7 @@ export class Section {
       g.setLineDash(FIBRE_DASH);
       g.stroke();
       g.setLineDash([]);
+      g.restore();
     }
   }
 

@@ -61,7 +61,7 @@ pub(super) fn sheet(dir: &Path) -> Result<Sheet, Error> {
     for (trace, (_, title)) in traces.iter().zip(INJECTIONS) {
         figures.push((
             over_time(&profile, trace, title),
-            "Fig. 6: positive resists insertion, negative holds the needle back on its way out. Marks: the layer that the tip comes to, and where it is drawn back.".into(),
+            "Fig. 6: positive resists insertion, negative holds the needle back on its way out. Marks: the layer that the tip comes to, and where it is drawn back; the withdrawal is shaded.".into(),
         ));
     }
     figures.push((
@@ -198,7 +198,8 @@ fn section(profile: &Profile, traces: &[Trace]) -> String {
         points: trace.way(0..trace.len()),
         marks: Vec::new(),
     };
-    Section { title: "Trajectories".into(), bands, vessel, ways: ways.map(way).collect(), needle: None }.svg()
+    let ways = ways.map(way).collect();
+    Section { title: "Trajectories".into(), bands, vessel, ways, ..Section::default() }.svg()
 }
 
 fn over_time(profile: &Profile, trace: &Trace, title: &str) -> String {
@@ -208,13 +209,15 @@ fn over_time(profile: &Profile, trace: &Trace, title: &str) -> String {
         let at = trace.last_event(deepest, is_contact_with(number(profile, *tissue)?))?;
         Some((seconds(at), tissue_name(*tissue).to_owned()))
     });
-    let back = (seconds(trace.drawn_back(deepest)), "withdrawal".to_owned());
+    let drawn_back = seconds(trace.drawn_back(deepest));
+    let back = (drawn_back, "withdrawal".to_owned());
     Chart {
         title: title.into(),
         x_label: "time, s".into(),
         y_label: "force, N".into(),
         curves: vec![Curve { points: trace.force_over_time(0..trace.len()), ..Curve::default() }],
         marks: met.chain([back]).collect(),
+        zone: Some((drawn_back, seconds(trace.len()))),
         ..Chart::default()
     }
     .svg()

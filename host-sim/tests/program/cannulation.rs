@@ -72,6 +72,12 @@ fn judged(patient: &str, script: &str, wanted: Option<&str>) {
     let found = reasons(verdict);
     let keys: Vec<&str> = found.iter().map(|(key, _)| key.as_str()).collect();
     assert_eq!(keys, wanted.into_iter().collect::<Vec<_>>(), "{name}: {verdict}");
+    // What would harm a patient is a critical error: blood from an artery is.
+    let harms = ["far_wall", "catheter_early", "tourniquet_left_on", "withdrawn_early", "artery", "nerve"];
+    for reason in verdict["reasons"].as_array().expect("a list") {
+        let key = reason["key"].as_str().expect("a key");
+        assert_eq!(reason["critical"], Value::Bool(harms.contains(&key)), "{name}: {verdict}");
+    }
     assert_eq!(verdict["passed"], Value::Bool(wanted.is_none()), "{name}: {verdict}");
     let steps = verdict["steps"].as_array().expect("steps");
     assert_eq!(steps.len(), 10, "{name}: {verdict}");

@@ -2,6 +2,7 @@
 //! twenty-four.
 
 mod acceptance;
+mod audit;
 mod axes;
 mod bone;
 mod cannulation;

@@ -22,6 +22,7 @@ fn scene() -> Scene {
         force_scale: 1.0,
         tilt_rad: 0.5,
         skin_tilt_rad: 0.0,
+        slope_deg: None,
         vessel: None,
         body: None,
         beside: Vec::new(),

@@ -85,6 +85,7 @@ const SPARTE: [&[Range]; 2] = [
         ("tracking", |c, v| sparte(c).tracking.0 = q(v), [[0.8, 0.0], [0.8, 99.0]]),
         ("after a puncture", |c, v| sparte(c).after_puncture = q(v), [[0.6, -1.0], [0.6, 2.0]]),
         ("relaxing", |c, v| sparte(c).relax_ms = v as u16, [[300.0, 0.0], [300.0, 65_535.0]]),
+        ("a wall's rate", |c, v| sparte(c).wall_rate = q(v), [[0.001, -1.0], [0.001, 1.0]]),
         ("cutting", |c, v| sparte(c).cutting[1].inwards.0 = q(v), [[1.5, -1.0], [1.5, 99.0]]),
     ],
     &[

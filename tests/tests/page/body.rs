@@ -108,14 +108,19 @@ fn by_pointer(page: &mut Page) -> Result<(), Error> {
     };
     let probe =
         find(page, "Math.hypot(at.place[0] - __body.probe.along, at.place[1] - __body.probe.across) < 3")?;
-    let away = find(page, "Math.abs(at.place[0] - 7) < 1.5 && Math.abs(at.place[1] + 5) < 1.5")?;
+    let away = find(
+        page,
+        "Math.abs(Math.hypot(at.place[0] - __body.probe.along, at.place[1] - __body.probe.across) - 8) < 1.5",
+    )?;
+    let [along, across] = [0, 1].map(|index| format!("__body.sight({}, {}).place[{index}]", away.0, away.1));
+    let (along, across) = (page.number(&along)?, page.number(&across)?);
     page.mouse("mousePressed", probe)?;
     page.mouse("mouseMoved", away)?;
     page.mouse("mouseReleased", away)?;
     page.wait(
         "the probe there",
         SOON,
-        "Math.abs(__body.probe.along - 7) < 3 && Math.abs(__body.probe.across + 5) < 3",
+        &format!("Math.hypot(__body.probe.along - {along}, __body.probe.across - {across}) < 3"),
     )?;
     let entry = find(page, "at.place[0] < -12 && Math.abs(at.place[1]) > 6")?;
     let wanted = page.number(&format!("__body.sight({}, {}).along", entry.0, entry.1))?;

@@ -5,6 +5,7 @@ mod board_page;
 mod board_session;
 mod body;
 mod browser;
+mod class_card;
 mod editor;
 mod graphics;
 mod guide;

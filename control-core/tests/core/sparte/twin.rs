@@ -105,9 +105,10 @@ impl Twin {
                 if travel < 0.0 { 0.0 } else { travel * travel / w.elastic.compliance.0.to_num::<f64>() }
             },
         );
+        let rate = elastic * (self.sparte.wall_rate.to_num::<f64>() * v).max(-1.0);
         if self.given == 0 || x < self.tops[0] {
             (self.wall, self.bristles, self.rest) = (x, 0.0, None);
-            return elastic;
+            return elastic + rate;
         }
         let innermost = self.tops[..self.touched].iter().rposition(|&top| x >= top).unwrap_or(0);
         let cut = self.sparte.cutting[innermost];
@@ -115,7 +116,7 @@ impl Twin {
             let left = cut.inwards.0.to_num::<f64>() * self.sparte.after_puncture.to_num::<f64>();
             self.wall = x - left / self.sparte.tracking.0.to_num::<f64>();
         }
-        elastic + self.track(cut, elastic, x) + self.rub(step, v)
+        elastic + rate + self.track(cut, elastic, x) + self.rub(step, v)
     }
 
     fn track(&mut self, cut: Cutting, elastic: f64, x: f64) -> f64 {

@@ -47,3 +47,38 @@ impl Grip {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::device::device_config::DeviceConfig;
+    use crate::device::virtual_device::VirtualDevice;
+    use crate::named_files::Text;
+    use crate::procedure::Procedure;
+    use crate::profile::Profile;
+
+    /// The adult's skin gives way at 1 N. Rollers that hold 0.3 N slip, which is said once for the
+    /// skin; rollers that hold 7 N do not.
+    #[test]
+    fn a_needle_that_slips_is_reported() {
+        let adult = Profile::find("adult").expect("it is built in");
+        for (pressing_n, wanted) in [(20.0, 0..=0), (0.86, 1..=3)] {
+            let file =
+                "format = 1\nname = \"x\"\ncommissioned = true\n[grip]\npressing_n = 20.0\nfriction = 0.35\n";
+            let mut part =
+                DeviceConfig::parse(Text { origin: "device.toml".into(), text: file.into() }).expect("sound");
+            // As loose as no file may say: less than the torque asks for.
+            part.grip = Some(Grip { pressing_n, friction: 0.35 });
+            let procedure = Procedure::find("venepuncture", &adult).expect("it is built in");
+            let mut device = VirtualDevice::built(&adult, procedure, Some(&part));
+            device.start_alone();
+            let mut said = Vec::new();
+            for _ in 0..50_000 {
+                device.tick_alone();
+                said.extend(device.take_done());
+            }
+            let count = said.iter().filter(|name| **name == "slipping").count();
+            assert!(wanted.contains(&count), "{pressing_n} N: {said:?}");
+        }
+    }
+}

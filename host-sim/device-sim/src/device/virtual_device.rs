@@ -16,6 +16,7 @@ use control_core::{AnyOrder, Controller, Order, Patient, Plan, TICK_HZ, TickInpu
 use link::codec::MAX_FRAME;
 use link::device::{Endpoint, Identity};
 use link::frames::{Stage, StageTime, Timing};
+use std::f64::consts::FRAC_PI_2;
 use std::time::{Duration, Instant};
 
 /// One tick in s.
@@ -29,6 +30,8 @@ const DRAG_LAG_S: f64 = 0.04;
 /// hand with a needle in tissue can do, and the device would take it for a motor that is wired the
 /// wrong way.
 const DRAG_MM_PER_S2: f64 = 3000.0;
+/// The name by which a barrier is reported that stops the needle's turning.
+pub const SLOPE_BARRIER: &str = "slope_barrier";
 /// One tick in this many is timed: a look at the clock costs a quarter of a tick.
 const TIMED_TICKS: u64 = 16;
 
@@ -61,6 +64,11 @@ pub struct VirtualDevice {
     /// The step of the procedure that is going on, as soon as it has begun.
     step: Option<usize>,
     is_on_bone: bool,
+    /// Ticks until a needle that slips is reported again.
+    slips_for: u32,
+    /// The tilt that the hand wants, and those at which a barrier stops the needle, rad.
+    wanted_tilt: f64,
+    tilt_limits: Option<[f64; 2]>,
     /// Tasks that the scripted hand has done and that have not been reported yet, and "bone" where
     /// the tip has met bone.
     done: Vec<&'static str>,
@@ -102,6 +110,7 @@ impl VirtualDevice {
         let mut plant = Plant::new(mechanism, procedure.grip, procedure.start_mm * 1e-3);
         plant.set_tilt(procedure.entry_rad.unwrap_or(profile.entry_rad) + profile.skin_tilt_rad());
         Self {
+            wanted_tilt: plant.tilt(),
             plant,
             endpoint: Endpoint::new(Identity::VIRTUAL, &plan, None).knowing_depth(),
             controller: Controller::new(plan),
@@ -111,8 +120,10 @@ impl VirtualDevice {
             hand_mm_per_s: 0.0,
             zero_mm: 0.0,
             turned_rad: 0.0,
+            tilt_limits: None,
             step: None,
             is_on_bone: false,
+            slips_for: 0,
             done: Vec::new(),
             set_value: 0.0,
             enable: false,
@@ -214,7 +225,17 @@ impl VirtualDevice {
         if self.is_on_bone && !was_on_bone {
             self.done.push("bone");
         }
+        self.note_slipping();
         self.tick += 1;
+    }
+
+    /// Reports a needle that slips in the rollers, once until it has held for half a second.
+    fn note_slipping(&mut self) {
+        if !self.plant.is_slipping() {
+            self.slips_for = self.slips_for.saturating_sub(1);
+        } else if std::mem::replace(&mut self.slips_for, TICK_HZ / 2) == 0 {
+            self.done.push("slipping");
+        }
     }
 
     /// Takes bytes from the PC.
@@ -249,6 +270,11 @@ impl VirtualDevice {
         self.plant.set_bone(depth_mm.map(|mm| (mm + self.zero_mm) * 1e-3));
     }
 
+    /// Barriers stop the needle at these tilts, rad, or nothing does.
+    pub fn limit_tilt(&mut self, limits: Option<[f64; 2]>) {
+        self.tilt_limits = limits;
+    }
+
     /// Moves the simulated hand or the device. What concerns the control law goes over the link and
     /// not through here.
     pub fn control(&mut self, control: Control) {
@@ -260,7 +286,7 @@ impl VirtualDevice {
             Control::Release => self.hand = Hand::Drag { wanted_mm: self.hand_mm },
             Control::Demo => self.restart_script(),
             Control::Tilt { rad } if rad.is_finite() => {
-                self.plant.set_tilt(rad.clamp(-std::f64::consts::FRAC_PI_2, std::f64::consts::FRAC_PI_2));
+                self.turn_to(rad);
             }
             _ => {}
         }
@@ -338,8 +364,8 @@ impl VirtualDevice {
         }
     }
 
-    /// Returns the tasks that the scripted hand has done since the last time, and "bone" where the
-    /// tip has met bone.
+    /// Returns the tasks that the scripted hand has done since the last time, "bone" where the tip
+    /// has met bone, "slipping" where the rollers did not hold the needle, and [`SLOPE_BARRIER`].
     pub fn take_done(&mut self) -> Vec<&'static str> {
         std::mem::take(&mut self.done)
     }
@@ -348,9 +374,19 @@ impl VirtualDevice {
     /// beginning has put it.
     fn turn(&mut self, turned_rad: f64) {
         if turned_rad != self.turned_rad {
-            let tilt = self.plant.tilt() + turned_rad - self.turned_rad;
-            self.plant.set_tilt(tilt.clamp(-std::f64::consts::FRAC_PI_2, std::f64::consts::FRAC_PI_2));
+            self.turn_to(self.wanted_tilt + turned_rad - self.turned_rad);
             self.turned_rad = turned_rad;
+        }
+    }
+
+    /// Turns the needle as far as the barriers let it, which are reported when it comes to one.
+    fn turn_to(&mut self, tilt: f64) {
+        let [low, high] = self.tilt_limits.unwrap_or([-FRAC_PI_2, FRAC_PI_2]);
+        let beyond = |tilt: f64| i8::from(tilt > high) - i8::from(tilt < low);
+        let before = beyond(std::mem::replace(&mut self.wanted_tilt, tilt));
+        self.plant.set_tilt(tilt.clamp(low, high));
+        if self.tilt_limits.is_some() && beyond(tilt) != 0 && beyond(tilt) != before {
+            self.done.push(SLOPE_BARRIER);
         }
     }
 

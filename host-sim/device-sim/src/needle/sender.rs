@@ -22,6 +22,8 @@ const OUT_OF_REACH_MM: f64 = 55.0;
 pub struct LineSender {
     track: NeedleTrack,
     plan: Plan,
+    /// The tilts, rad, at which a barrier stops the needle.
+    tilt_limits: Option<[f64; 2]>,
     /// The layers of the patient, which a device has until it is sent a line.
     own: NeedleLine,
     sent: NeedleLine,
@@ -39,6 +41,9 @@ impl LineSender {
             sent: profile.plan.own_line(),
             own: profile.plan.own_line(),
             plan: profile.plan.clone(),
+            tilt_limits: profile.slope.map(|slope| {
+                [slope.smallest, slope.largest].map(|deg| deg.to_radians() + profile.skin_tilt_rad())
+            }),
             sent_at: Duration::ZERO,
             has_pierced: false,
         }
@@ -66,6 +71,12 @@ impl LineSender {
     /// The needle that it follows.
     pub fn track(&self) -> &NeedleTrack {
         &self.track
+    }
+
+    /// Returns the tilts, rad, at which a barrier stops a needle that is turned; none where the
+    /// patient has no such range.
+    pub fn tilt_limits(&self) -> Option<[f64; 2]> {
+        self.tilt_limits
     }
 
     /// Returns the line to send at `now`, if it has changed or a wall has given way since the last

@@ -135,6 +135,11 @@ impl Plant {
         self.bone = place;
     }
 
+    /// True if the needle slips in the rollers, or is about to: they hold no more.
+    pub fn is_slipping(&self) -> bool {
+        self.shear.abs() >= self.most_shear
+    }
+
     /// True if the tip presses on bone.
     pub fn is_on_bone(&self) -> bool {
         self.bone.is_some_and(|place| self.tip > place)

@@ -15,6 +15,9 @@ const THINNEST_MM: f64 = 0.2;
 const REACH_MM: f64 = 55.0;
 /// Cartilage over the bone of a joint, mm: an assumption, 1 to 2 mm where it bears load.
 const OVER_BONE_MM: f64 = 1.5;
+/// The wall on the far side of an artery. It is no target and nothing to be spared: whoever comes
+/// to it has entered the artery.
+const FAR_ARTERIAL_WALL: &str = "far arterial wall";
 /// Thickness that fat may have, mm.
 const FAT_MM: [f64; 2] = [1.0, 60.0];
 
@@ -132,7 +135,8 @@ fn tissue_name(tissue: Tissue) -> TissueName {
 impl InBody {
     /// Returns the layers along the line, each with the forces of the file's layer of its tissue
     /// and its depth for a needle of this inclination, and notes their names. The device holds six:
-    /// past the sixth the needle goes on in it.
+    /// of more, those that feel like what they lie in are left out, and past the sixth the needle
+    /// goes on in it.
     pub(super) fn layers(&mut self, kinds: &[Layer]) -> Result<Vec<Layer>, String> {
         let of = |tissue: TissueName| kinds.iter().find(|layer| layer.tissue == tissue);
         if let Some(missing) =
@@ -145,12 +149,20 @@ impl InBody {
             ));
         }
         let sine = libm::sin(self.place.incline_deg.to_radians());
-        let has_far_wall = of(TissueName::FarWall).is_some();
-        let mut met = self.met_along(&self.pieces, has_far_wall);
+        let mut met = self.met_along(&self.pieces);
+        let is_needless = |above: TissueName, own: TissueName| {
+            of(above).zip(of(own)).is_some_and(|(above, own)| own.feels_like(above))
+        };
+        while met.len() > MAX_LAYERS
+            && let Some(needless) = met.windows(2).rposition(|pair| is_needless(pair[0].0, pair[1].0))
+        {
+            met.remove(needless + 1);
+        }
         met.truncate(MAX_LAYERS);
-        let layers = met.iter().filter_map(|(tissue, _, from_mm)| {
+        let layers = met.iter().filter_map(|(tissue, name, from_mm)| {
             let kind = of(*tissue)?.clone();
-            Some(Layer { depth_mm: Some(from_mm * sine), thickness: None, ..kind })
+            let spare = if *name == FAR_ARTERIAL_WALL { Some(false) } else { kind.spare };
+            Some(Layer { depth_mm: Some(from_mm * sine), thickness: None, spare, ..kind })
         });
         let layers = layers.collect();
         let names = met.into_iter().map(|(_, name, _)| name.to_owned()).collect();
@@ -159,7 +171,7 @@ impl InBody {
     }
 
     /// Returns tissue, name and beginning in mm of the layers that `pieces` of a line are.
-    fn met_along(&self, pieces: &[Piece], has_far_wall: bool) -> Vec<(TissueName, &'static str, f64)> {
+    fn met_along(&self, pieces: &[Piece]) -> Vec<(TissueName, &'static str, f64)> {
         let (mut met, mut last, mut vessel, mut under_wall) = (Vec::new(), None, false, None);
         for piece in pieces {
             let structure = &self.body.structures[piece.structure];
@@ -178,13 +190,14 @@ impl InBody {
                 continue;
             }
             met.push((tissue, structure.name, piece.from_mm));
-            if tissue == TissueName::Vessel {
-                vessel = true;
-                if has_far_wall {
-                    met.push((TissueName::FarWall, "far wall", piece.to_mm));
-                    under_wall = Some(piece.to_mm);
-                }
-            }
+            let far = match structure.tissue {
+                Tissue::Vessel => (TissueName::FarWall, "far wall"),
+                Tissue::Artery => (tissue, FAR_ARTERIAL_WALL),
+                _ => continue,
+            };
+            vessel |= tissue == TissueName::Vessel;
+            met.push((far.0, far.1, piece.to_mm));
+            under_wall = Some(piece.to_mm);
         }
         met
     }
@@ -194,7 +207,7 @@ impl InBody {
     /// plane, along it and below the point of entry, and is inclined by `incline_rad`.
     pub(crate) fn tops_mm(&self, origin_mm: [f64; 2], incline_rad: f64) -> Vec<Option<f64>> {
         let pieces = self.pieces_along(origin_mm, incline_rad);
-        let met = self.met_along(&pieces, true);
+        let met = self.met_along(&pieces);
         let mut from = 0;
         let top = |name: &String| {
             let found = from + met[from..].iter().position(|(_, own, _)| own == name)?;
@@ -274,90 +287,4 @@ impl File {
 }
 
 #[cfg(test)]
-mod tests {
-    use crate::named_files::Text;
-    use crate::procedure::Procedure;
-    use crate::profile::{BUILT_IN, Entry, Profile};
-
-    fn find(name: &str) -> Profile {
-        Profile::find(name).expect("it is built in")
-    }
-
-    fn layers(profile: &Profile) -> Vec<(String, f64)> {
-        let sine = profile.entry_rad.sin();
-        let layers = profile.config.patient.layers.iter().zip(0..);
-        let name = |number| profile.layer_name(number).expect("it has a name");
-        layers.map(|(layer, number)| (name(number), layer.depth.0.to_num::<f64>() / sine)).collect()
-    }
-
-    /// At any inclination the device meets each structure at the same mm along the needle as the
-    /// line does.
-    #[test]
-    fn the_devices_layers_are_those_of_the_line() {
-        for (name, degrees) in [("forearm", 25.0), ("shoulder-joint", 45.0), ("hip", 80.0), ("knee", 45.0)] {
-            let profile = find(name).at_angle(degrees).expect("it goes in");
-            let body = profile.body.as_ref().expect("a body");
-            let told = layers(&profile);
-            assert!(told.len() >= 4, "{name}: {told:?}");
-            for (layer, from_mm) in told {
-                let mut edges = body.pieces.iter().flat_map(|piece| [piece.from_mm, piece.to_mm]);
-                assert!(edges.any(|edge| (edge - from_mm).abs() < 2e-3), "{name}: {layer} at {from_mm} mm");
-            }
-        }
-    }
-
-    #[test]
-    fn another_entry_meets_other_structures() {
-        let at = |around: f64| {
-            find("shoulder-joint").entered(&Entry {
-                angle_deg: Some(85.0),
-                along_mm: Some(30.0),
-                around_deg: Some(around),
-                turn_deg: Some(-around),
-                azimuth_deg: None,
-            })
-        };
-        let (over, beside) = (at(39.2).expect("it goes in"), at(20.0).expect("it goes in"));
-        let has = |profile: &Profile, name: &str| layers(profile).iter().any(|(own, _)| own == name);
-        assert!(has(&over, "vein") && !has(&beside, "vein"));
-        let vein = layers(&over).iter().position(|(name, _)| name == "vein").expect("it is met") as u8;
-        assert!(over.spared.contains(&vein) && !beside.spared.contains(&vein));
-        // The bursa is the target, and here it is out of the way: it can only be missed.
-        let goal = beside.goal().expect("a target");
-        assert_eq!((goal.name.as_str(), goal.layer), ("bursa", NOT_ON_THE_LINE));
-        assert!(Procedure::find("bursa", &beside).is_ok(), "the scripted hand finds a way");
-    }
-
-    const NOT_ON_THE_LINE: u8 = u8::MAX;
-
-    #[test]
-    fn a_vein_that_is_missed_leaves_fat_and_muscle() {
-        let beside = Entry { around_deg: Some(25.0), ..Entry::default() };
-        let beside = find("forearm").entered(&beside).expect("it goes in");
-        let names: Vec<_> = layers(&beside).into_iter().map(|(name, _)| name).collect();
-        assert_eq!(names, ["skin", "fat", "muscle"]);
-        let over: Vec<_> = layers(&find("forearm")).into_iter().map(|(name, _)| name).collect();
-        assert_eq!(over, ["skin", "fat", "vein", "far wall", "muscle"]);
-    }
-
-    #[test]
-    fn a_body_that_cannot_be_entered_is_refused_with_its_reason() {
-        let forearm = BUILT_IN.iter().find(|(name, _)| *name == "forearm").expect("it is built in").1;
-        for (right, wrong, hint) in [
-            ("along_mm = 0.0", "along_mm = 300.0", "body.along_mm is 300"),
-            ("along_mm = 0.0", "along_mm = nan", "body.along_mm is NaN"),
-            ("turn_deg = 0.0", "turn_deg = 90.0", "turn the limb"),
-            ("turn_deg = 0.0", "turn_deg = 0.0\nfat_mm = 0.0", "body.fat_mm is 0"),
-            ("tissue = \"fat\"", "tissue = \"fat\"\ndepth_mm = 2.0", "remove depth_mm"),
-            ("tissue = \"muscle\"", "tissue = \"bursa\"", "forces of the muscle"),
-            ("site = \"forearm\"", "site = \"neck\"", "neck"),
-            ("[body]", "[vessel]\nwidth_mm = 3.0\n\n[body]", "remove [vessel]"),
-        ] {
-            let text = forearm.replacen(right, wrong, 1);
-            assert_ne!(text, forearm, "{right} is in the file");
-            let said =
-                Profile::parse(Text { origin: "test.toml".into(), text }).expect_err(wrong).to_string();
-            assert!(said.contains(hint) && said.contains("test.toml") && !said.contains('\n'), "{said}");
-        }
-    }
-}
+mod tests;

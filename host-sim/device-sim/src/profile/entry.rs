@@ -5,6 +5,7 @@ use super::body::{check_along, check_direction};
 use crate::error::Error;
 use crate::named_files::{self, Text};
 use anatomy::Site;
+use serde::Deserialize;
 
 /// The options of a command that change where and how a needle enters a body; without one, the
 /// patient's file says it.
@@ -24,14 +25,14 @@ pub struct Entry {
 
 impl Entry {
     /// Refuses values out of range at a site, by the names of the options.
-    fn check(&self, site: Site) -> Result<(), String> {
+    fn check(&self, site: Site, slope: Option<Slope>) -> Result<(), String> {
         self.along_mm.map_or(Ok(()), |mm| check_along("--along", mm, site))?;
         for (option, degrees) in
             [("--around", self.around_deg), ("--azimuth", self.azimuth_deg), ("--turn", self.turn_deg)]
         {
             degrees.map_or(Ok(()), |degrees| check_direction(option, degrees))?;
         }
-        self.angle_deg.map_or(Ok(()), |degrees| check_angle("--angle", degrees))
+        self.angle_deg.map_or(Ok(()), |degrees| check_entry("--angle", degrees, slope))
     }
 }
 
@@ -47,7 +48,7 @@ impl Profile {
         let body = self.body.as_ref().ok_or_else(|| {
             refuse("this patient is layers without a body; choose one with [body], such as forearm")
         })?;
-        entry.check(body.site).map_err(Error::input)?;
+        entry.check(body.site, self.slope).map_err(Error::input)?;
         let mut table: toml::Table = named_files::parse(&self.source)?;
         let set = |table: &mut toml::Table, key: &str, value: Option<f64>| {
             if let Some(value) = value {
@@ -66,12 +67,47 @@ impl Profile {
     }
 }
 
+/// `slope_deg` of a patient: the angles to the skin between which the device's barrier holds the
+/// needle, condition 5 of Paper 001. In a body the angle is that below the horizontal.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Slope {
+    /// The flattest, degrees.
+    pub smallest: f64,
+    /// The steepest, degrees.
+    pub largest: f64,
+}
+
+impl Slope {
+    /// Refuses a range that is upside down or that no needle has.
+    pub(super) fn check(self) -> Result<(), String> {
+        check_angle("slope_deg.smallest", self.smallest)?;
+        check_angle("slope_deg.largest", self.largest)?;
+        if self.smallest < self.largest {
+            return Ok(());
+        }
+        let Self { smallest, largest } = self;
+        Err(format!("slope_deg is from {smallest} to {largest} degrees; give the smaller one as smallest"))
+    }
+}
+
 /// Refuses an angle to the skin that no needle has; `key` as the user wrote it.
 pub(super) fn check_angle(key: &str, degrees: f64) -> Result<(), String> {
     if (5.0..=90.0).contains(&degrees) {
         Ok(())
     } else {
         Err(format!("{key} is {degrees} degrees; it must be from 5 to 90 degrees, the angle to the skin"))
+    }
+}
+
+/// Refuses an angle at entry that no needle has, or that is outside the patient's `slope_deg`.
+pub(crate) fn check_entry(key: &str, degrees: f64, slope: Option<Slope>) -> Result<(), String> {
+    check_angle(key, degrees)?;
+    match slope {
+        Some(Slope { smallest, largest }) if !(smallest..=largest).contains(&degrees) => Err(format!(
+            "{key} is {degrees} degrees; it must be from {smallest} to {largest} degrees, the slope_deg of the patient"
+        )),
+        _ => Ok(()),
     }
 }
 

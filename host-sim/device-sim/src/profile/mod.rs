@@ -7,29 +7,34 @@ mod body;
 mod bone;
 mod condition;
 mod entry;
+mod force_table;
 mod goal;
 mod law;
+mod needle;
 mod person;
 mod refusal;
 mod rupture;
+mod scene;
 mod tissues;
 
 use crate::error::Error;
 use crate::named_files::{self, Text};
-use crate::session::{Scene, SceneBeside, SceneLayer, SceneNeedle, SceneVessel, Source, tissue_name};
+use crate::session::tissue_name;
 use control_core::config::{self, Config, Tissue};
 use control_core::units::{FrictionPerMillimetre, JogCompliance, Millimetres, Newtons, Stiffness};
 use control_core::{Device, Patient, Plan};
 use fixed::types::I16F16;
+use force_table::Forces;
+use needle::Needle;
+use person::Thickness;
 use serde::Deserialize;
 
 pub use beside::Beside;
 pub use body::InBody;
-pub use entry::Entry;
-use entry::check_angle;
+pub(crate) use entry::check_entry;
+pub use entry::{Entry, Slope};
 pub use goal::Goal;
 pub use law::Model;
-use person::Thickness;
 pub use person::{Difficulty, Person, Sex, Site};
 pub(crate) use tissues::TissueName;
 
@@ -59,6 +64,8 @@ pub struct Profile {
     pub name: String,
     /// Angle of the needle to the skin at entry, in rad.
     pub entry_rad: f64,
+    /// The angles to the skin between which the device's barrier holds the needle, if it has one.
+    pub slope: Option<Slope>,
     /// The device's configuration: its own part and this patient.
     pub config: Config,
     /// The same, checked.
@@ -106,11 +113,16 @@ impl Profile {
         if file.format != 1 {
             return Err(refuse(format!("format is {}; this program reads format 1", file.format)));
         }
-        check_angle("entry_deg", file.entry_deg).map_err(refuse)?;
+        file.slope_deg.map_or(Ok(()), Slope::check).map_err(refuse)?;
+        check_entry("entry_deg", file.entry_deg, file.slope_deg).map_err(refuse)?;
         file.patient.check().map_err(refuse)?;
         file.beside.iter().try_for_each(Beside::check).map_err(refuse)?;
         condition::apply(&mut file.layer, &file.patient, file.force_table.is_some()).map_err(refuse)?;
+        if let Some(needle) = file.needle {
+            needle.apply(&mut file.layer, file.law.as_mut()).map_err(refuse)?;
+        }
         file.target.map_or(Ok(()), |goal| goal.check(&file.layer)).map_err(refuse)?;
+        check_vessels(&file.layer).map_err(refuse)?;
         let is_vein = |layer: &Layer| layer.tissue == TissueName::Vessel && !layer.is_spared();
         let has_vein = file.layer.iter().any(is_vein);
         let body = file.take_body().map_err(refuse)?;
@@ -130,6 +142,7 @@ impl Profile {
             person: file.patient,
             name: file.name,
             entry_rad: file.entry_deg.to_radians(),
+            slope: file.slope_deg,
             config,
             plan,
             source,
@@ -141,50 +154,9 @@ impl Profile {
         Model::of(&self.config.patient.law)
     }
 
-    /// Returns the scene for a picture.
-    pub fn scene(&self, source: Source, procedure: Option<String>) -> Scene {
-        let ruptures = rupture::ruptures(&self.config.patient, self.entry_rad);
-        let sine = libm::sin(self.entry_rad);
-        let layers = self.config.patient.layers.iter().enumerate().map(|(index, layer)| SceneLayer {
-            name: tissue_name(layer.tissue).to_owned(),
-            structure: self.body.as_ref().and_then(|body| body.names.get(index).cloned()),
-            is_vessel: layer.tissue == Tissue::Vessel,
-            is_far_wall: layer.tissue == Tissue::FarWall,
-            depth_mm: layer.depth.0.to_num(),
-            puncture_travel_mm: match layer.wall {
-                Some(wall) => Some(wall.puncture_travel.0.to_num()),
-                None => ruptures.iter().find(|r| r.layer == index).map(|r| r.below_mm / sine),
-            },
-            spring_back: layer.wall.map(|wall| wall.spring_back.to_num()),
-            puncture_force_n: match layer.wall {
-                Some(wall) => Some(force_n(&wall.elastic, wall.puncture_travel.0.to_num())),
-                None => ruptures.iter().find(|r| r.layer == index).map(|r| r.force_n),
-            },
-            friction_n_per_mm: layer.friction.0.to_num(),
-        });
-        let deepest_mm = self.config.patient.layers.last().map_or(0.0, |layer| layer.depth.0.to_num::<f64>());
-        Scene {
-            hand: source == Source::Virtual,
-            source,
-            profile: self.name.clone(),
-            procedure,
-            layers: layers.collect(),
-            roller_radius_mm: self.config.device.roller_radius.0.to_num(),
-            travel_mm: self.config.device.limits.travel.0.to_num(),
-            largest_force_n: self.plan.largest_force().0.to_num(),
-            force_scale: self.config.patient.scale.to_num(),
-            tilt_rad: self.tilt_rad(),
-            skin_tilt_rad: self.skin_tilt_rad(),
-            vessel: self.vessel().filter(|_| self.body.is_none()),
-            body: self.body.as_ref().map(InBody::scene),
-            beside: self.beside.iter().map(SceneBeside::from).collect(),
-            needle: SceneNeedle::reaching(deepest_mm / libm::sin(self.entry_rad)),
-        }
-    }
-
-    /// The same patient with another angle to the skin at entry, 5 to 90°.
+    /// The same patient with another angle to the skin at entry, 5 to 90° and within its slope.
     pub fn at_angle(self, degrees: f64) -> Result<Self, Error> {
-        check_angle("--angle", degrees).map_err(Error::input)?;
+        check_entry("--angle", degrees, self.slope).map_err(Error::input)?;
         if self.body.is_some() {
             return self.entered(&Entry { angle_deg: Some(degrees), ..Entry::default() });
         }
@@ -198,6 +170,12 @@ impl Profile {
         }
         let layer = self.config.patient.layers.get(usize::from(number))?;
         Some(tissue_name(layer.tissue).to_owned())
+    }
+
+    /// Returns the number of the vessel's far wall.
+    pub fn far_wall(&self) -> Option<u8> {
+        let mut layers = (0_u8..).zip(&self.config.patient.layers);
+        layers.find(|(_, layer)| layer.tissue == Tissue::FarWall).map(|(number, _)| number)
     }
 
     /// Returns for each layer, outermost first, whether it has a wall that gives way.
@@ -225,22 +203,6 @@ impl Profile {
     pub fn tilt_rad(&self) -> f64 {
         self.entry_rad + self.skin_tilt_rad()
     }
-
-    fn vessel(&self) -> Option<SceneVessel> {
-        let layers = &self.config.patient.layers;
-        let depth_mm = |tissue| {
-            let layer = layers.iter().find(|layer| layer.tissue == tissue)?;
-            Some(layer.depth.0.to_num::<f64>())
-        };
-        let (near, far) = (depth_mm(Tissue::Vessel)?, depth_mm(Tissue::FarWall)?);
-        let shape = self.config.patient.vessel;
-        Some(SceneVessel {
-            axis_mm: (near + far) / 2.0,
-            height_mm: far - near,
-            width_mm: shape.map_or(far - near, |shape| shape.width.0.to_num()),
-            offset_mm: shape.map_or(0.0, |shape| shape.offset.0.to_num()),
-        })
-    }
 }
 
 /// Depth in mm along a needle at `angle_rad` to the skin at which the wall of `layer` gives way,
@@ -250,10 +212,15 @@ pub(crate) fn puncture_path_mm(layer: &config::Layer, angle_rad: f64) -> Option<
     Some(layer.depth.0.to_num::<f64>() / libm::sin(angle_rad) + wall.puncture_travel.0.to_num::<f64>())
 }
 
-/// `(T − n)²/a + b` of Paper 001, eq. 1, in N; `travel_mm` is T.
-fn force_n(parabola: &config::Parabola, travel_mm: f64) -> f64 {
-    let from_vertex = travel_mm - parabola.vertex.0.to_num::<f64>();
-    from_vertex * from_vertex / parabola.compliance.0.to_num::<f64>() + parabola.base.0.to_num::<f64>()
+/// Refuses a vessel without a far wall: through it a needle would stay in the lumen for ever.
+fn check_vessels(layers: &[Layer]) -> Result<(), String> {
+    let number = |tissue| layers.iter().position(|layer| layer.tissue == tissue);
+    match (number(TissueName::Vessel), number(TissueName::FarWall)) {
+        (Some(near), None) => Err(format!(
+            "layer {near} is a vessel without a far wall; add a layer of tissue \"far-wall\" below it"
+        )),
+        _ => Ok(()),
+    }
 }
 
 #[derive(Deserialize)]
@@ -263,6 +230,8 @@ struct File {
     name: String,
     /// Angle of the needle to the skin at entry, 5 to 90 degrees.
     entry_deg: f64,
+    /// The range of angles to the skin that the device's barrier leaves.
+    slope_deg: Option<Slope>,
     /// In N; without it, as much as the device gives.
     largest_force_n: Option<f64>,
     /// Share of the law's forces that is given to the hand, where the motor is too weak for them.
@@ -272,7 +241,8 @@ struct File {
     patient: Person,
     law: Option<law::LawTable>,
     friction: Option<law::Friction>,
-    force_table: Option<law::Forces>,
+    needle: Option<Needle>,
+    force_table: Option<Forces>,
     layer: Vec<Layer>,
     body: Option<body::Written>,
     vessel: Option<Vessel>,
@@ -378,6 +348,12 @@ impl File {
 impl Layer {
     fn is_spared(&self) -> bool {
         self.spare.unwrap_or(matches!(self.tissue, TissueName::Tendon | TissueName::Cartilage))
+    }
+
+    /// True if a needle that comes into it from a layer `above` feels no change.
+    fn feels_like(&self, above: &Self) -> bool {
+        let is_like = self.cutting == above.cutting && self.friction_n_per_mm == above.friction_n_per_mm;
+        self.wall.is_none() && !self.is_spared() && is_like
     }
 
     fn config(&self, depth_mm: f64) -> Result<config::Layer, String> {

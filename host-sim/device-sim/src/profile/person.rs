@@ -68,10 +68,18 @@ pub enum Difficulty {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub(super) enum Thickness {
-    /// The superficial fat of the posterior arm by ultrasound, for each class of body mass index
-    /// and sex. Cotofana et al. 2020, J Drugs Dermatol 19(1):36.
+    /// The fat over the deltoid by ultrasound, for each sex, in proportion to body mass index.
     ByBodyMass,
 }
+
+/// From skin to muscle over the deltoid on average, mm: Poland et al. 1997, JAMA 277(21):1709.
+const MEAN_MALE_MM: f64 = 8.3;
+const MEAN_FEMALE_MM: f64 = 11.7;
+/// The skin's part of it, mm: Laurent 2007.
+const SKIN_MM: f64 = 2.5;
+/// Body mass index at which they hold, kg/m². It was the same in both sexes; its value, and that
+/// the fat is in proportion to it, are assumptions.
+const MEAN_INDEX: f64 = 26.5;
 
 impl Thickness {
     /// Returns the thickness for this patient, mm; an error if the patient's file does not say
@@ -80,12 +88,11 @@ impl Thickness {
         let Self::ByBodyMass = self;
         let missing = || "thickness by-body-mass needs patient.sex, weight_kg and height_cm".to_owned();
         let (sex, index) = (person.sex.ok_or_else(missing)?, person.body_mass_index().ok_or_else(missing)?);
-        // Below 25 kg/m², to 30, above.
-        let by_class = match sex {
-            Sex::Male => [3.70, 4.39, 5.09],
-            Sex::Female => [3.54, 4.34, 5.21],
+        let mean_mm = match sex {
+            Sex::Male => MEAN_MALE_MM,
+            Sex::Female => MEAN_FEMALE_MM,
         };
-        Ok(by_class[usize::from(index >= 25.0) + usize::from(index >= 30.0)])
+        Ok((mean_mm - SKIN_MM) * index / MEAN_INDEX)
     }
 }
 
@@ -149,8 +156,9 @@ mod tests {
         };
         let fat_mm =
             |sex, weight_kg| Thickness::ByBodyMass.of_mm(&person(sex, weight_kg)).expect("all is known");
-        assert_eq!([99.0, 100.0, 119.0, 121.0].map(|kg| fat_mm(Sex::Male, kg)), [3.70, 4.39, 4.39, 5.09]);
-        assert_eq!([80.0, 110.0, 160.0].map(|kg| fat_mm(Sex::Female, kg)), [3.54, 4.34, 5.21]);
+        // Poland's means from skin to muscle at 26.5 kg/m², which is 106 kg here.
+        assert!((fat_mm(Sex::Male, 106.0) + 2.5 - 8.3).abs() < 1e-9);
+        assert!((fat_mm(Sex::Female, 106.0) + 2.5 - 11.7).abs() < 1e-9);
         let unknown = Person { height_cm: None, ..person(Sex::Male, 80.0) };
         assert!(Thickness::ByBodyMass.of_mm(&unknown).expect_err("no height").contains("height_cm"));
     }

@@ -1,6 +1,7 @@
 //! Profiles that are taken, and what is said of those that are not.
 
 use super::*;
+use crate::session::Source;
 
 fn text(text: impl Into<String>) -> Text {
     Text { origin: "test.toml".into(), text: text.into() }
@@ -70,6 +71,31 @@ fn friction_may_have_a_static_and_a_dynamic_level() {
     }
 }
 
+/// Skin to muscle in a shoulder of 176 cm, perpendicular to the skin, mm.
+fn skin_to_muscle_mm(name: &str, sex: &str, weight_kg: f64) -> f64 {
+    let file = BUILT_IN.iter().find(|(own, _)| *own == name).expect("it is built in").1;
+    let file = file.replace("\"male\"", &format!("\"{sex}\"")).replace("82.0", &format!("{weight_kg:.1}"));
+    let profile = Profile::parse(text(file)).expect("a person may weigh so much");
+    let muscle = profile.config.patient.layers.iter().find(|layer| layer.tissue == Tissue::Muscle);
+    muscle.expect("the needle meets it").depth.0.to_num()
+}
+
+/// The audit found the same 6.2 mm at 50 and 77 kg, and the same 7.6 mm at 93 and 200 kg.
+#[test]
+fn no_two_weights_have_the_same_fat() {
+    for (name, sex) in [("shoulder", "male"), ("shoulder", "female"), ("shoulder-joint", "female")] {
+        let weights_kg = (0..=150).map(|step| 50.0 + f64::from(step));
+        let found_mm: Vec<f64> = weights_kg.map(|kg| skin_to_muscle_mm(name, sex, kg)).collect();
+        let grows = |pair: &[f64]| (0.02..0.4).contains(&(pair[1] - pair[0]));
+        assert!(found_mm.windows(2).all(grows), "{name}, {sex}: {found_mm:.2?}");
+    }
+    // Poland 1997: means of 8.3 and 11.7 mm from skin to muscle, in people of 82 kg or so.
+    for (sex, wanted_mm) in [("male", 8.3), ("female", 11.7)] {
+        let found_mm = skin_to_muscle_mm("shoulder", sex, 82.0);
+        assert!((found_mm - wanted_mm).abs() < 0.1, "{sex}: {found_mm} mm");
+    }
+}
+
 #[test]
 fn mistakes_are_named_with_their_line() {
     for (wrong, hint) in [
@@ -80,6 +106,7 @@ fn mistakes_are_named_with_their_line() {
         (BUILT_IN[0].1.replace("depth_mm = 2.0", "depth_mm = 1e300"), "depth_mm"),
         (format!("{}\n[limits]\ntorque_mnm = 90.0\n", BUILT_IN[0].1), "limits"),
         (format!("largest_force_n = 9.0\n{}", BUILT_IN[0].1), "ceiling of 2.880 N"),
+        (BUILT_IN[0].1.replace("\"far-wall\"", "\"muscle\""), "layer 2 is a vessel without a far wall"),
         ("[[layer]".into(), "line 1"),
         (String::new(), "format"),
     ] {

@@ -31,6 +31,10 @@ pub struct Scene {
     /// Inclination of the needle laid on the skin, in rad; the angle to the skin is the rest of the
     /// tilt.
     pub skin_tilt_rad: f64,
+    /// The smallest and the largest angle to the skin, degrees, between which a barrier holds the
+    /// needle.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub slope_deg: Option<[f64; 2]>,
     /// The vessel, where there is one with two walls.
     pub vessel: Option<SceneVessel>,
     /// The body that the layers come from; without it they are slabs that go on for ever.
@@ -176,6 +180,9 @@ pub struct SceneLayer {
     pub is_far_wall: bool,
     /// Depth of its outer face in mm, perpendicular to the skin.
     pub depth_mm: f64,
+    /// From where to where along the skin it reaches, in mm from the point of entry, if it ends.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reach_mm: Option<[f64; 2]>,
     /// The travel along the needle at which its wall gives way, in mm, if it has one.
     pub puncture_travel_mm: Option<f64>,
     /// Part of that which is left when it has just given way, 0 to 1.

@@ -95,7 +95,7 @@ mod tests {
     /// The needle's own line is in the section: what it meets at 45° is on the outlines.
     #[test]
     fn a_section_shows_what_the_needle_meets() {
-        let body = Site::Shoulder.body(4.39);
+        let body = Site::Shoulder.body(5.79);
         let place =
             Place { along_mm: 25.0, around_deg: 0.0, azimuth_deg: 180.0, turn_deg: 0.0, incline_deg: 45.0 };
         let line = place.line(&body).expect("it goes in");

@@ -173,9 +173,9 @@ mod tests {
         let wanted = [
             ("skin", 0.0),
             ("fat", 2.5),
-            ("deltoid", 6.89),
-            ("bursa", 50.89 - 31.607),
-            ("rotator cuff", 50.89 - 28.566),
+            ("deltoid", 8.29),
+            ("bursa", 52.29 - 31.607),
+            ("rotator cuff", 52.29 - 28.566),
         ];
         for ((name, from), (wanted_name, wanted_from)) in met.iter().zip(wanted) {
             assert!(*name == wanted_name && (from - wanted_from).abs() < 0.01, "{met:?}");

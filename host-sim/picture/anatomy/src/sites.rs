@@ -38,7 +38,7 @@ impl Site {
     /// Returns the thickness of its fat if the patient says nothing of it, mm.
     pub fn usual_fat_mm(self) -> f64 {
         match self {
-            Self::Shoulder => 4.39,
+            Self::Shoulder => 5.79,
             Self::Forearm => 8.0,
             Self::Knee => 6.0,
             Self::Hip => 20.0,

@@ -42,6 +42,7 @@ pub(crate) fn test_scene() -> device_sim::session::Scene {
         force_scale: 1.0,
         tilt_rad: 0.5,
         skin_tilt_rad: 0.0,
+        slope_deg: None,
         vessel: None,
         body: None,
         beside: Vec::new(),

@@ -10,9 +10,9 @@ use crate::score::{Insertion, Judge, Span, each};
 use control_core::TICK_HZ;
 use device_sim::error::Error;
 use device_sim::profile::Profile;
-use device_sim::session::{Scene, SceneNeedle, SceneVessel, Source};
+use device_sim::session::{Scene, SceneNeedle, SceneOutline, SceneVessel, Source};
 use html_report::chart::{Chart, Curve};
-use html_report::section::{Band, Needle, Section, Tube, Way};
+use html_report::section::{Band, Needle, Outline, Section, Tube, Way};
 use html_report::{Sheet, decimal};
 use link::frames::EventKind;
 use recording::read::Recording;
@@ -132,8 +132,23 @@ fn best(attempts: &[Attempt]) -> Option<&Attempt> {
 /// Layers and vessel of a scene as they are drawn on paper.
 pub fn anatomy(scene: &Scene) -> (Vec<Band>, Option<Tube>) {
     let bands = scene.layers.iter().filter(|layer| !layer.is_vessel && !layer.is_far_wall);
-    let bands = bands.map(|layer| Band { name: layer.name.clone(), top_mm: layer.depth_mm });
+    let bands = bands.map(|layer| Band {
+        name: layer.name.clone(),
+        top_mm: layer.depth_mm,
+        reach_mm: layer.reach_mm,
+    });
     (bands.collect(), scene.vessel.as_ref().map(tube))
+}
+
+/// The structures of the scene's body as they are drawn on paper; none of level layers.
+fn outlines(scene: &Scene) -> Vec<Outline> {
+    let all = scene.body.iter().flat_map(|body| &body.outlines);
+    let drawn = |one: &SceneOutline| Outline {
+        name: one.name.clone(),
+        tissue: one.tissue.clone(),
+        points_mm: one.points_mm.clone(),
+    };
+    all.map(drawn).collect()
 }
 
 /// The needle of the scene where an attempt was deepest.
@@ -162,7 +177,8 @@ fn pictures(compared: &[&Attempt], scene: &Scene) -> Vec<(String, String)> {
         marks: one.punctures.clone(),
     });
     let needle = compared.last().and_then(|one| needle(one, scene));
-    let section = Section { title: "Way of the tip".into(), bands, vessel, ways: ways.collect(), needle };
+    let title = "Way of the tip".into();
+    let section = Section { title, bands, vessel, outlines: outlines(scene), ways: ways.collect(), needle };
     let curves = |points: &dyn Fn(&Attempt) -> Vec<(f64, f64)>| -> Vec<Curve> {
         let each = compared.iter().enumerate();
         each.map(|(index, one)| Curve {

@@ -20,6 +20,8 @@ pub(crate) struct Surroundings {
     pub(super) target_layer: Option<usize>,
     /// The depth of a target that ends to either side, perpendicular to the level skin, mm.
     pub(super) target_depth_mm: Option<f64>,
+    /// The far wall of the vessel.
+    pub(super) far_wall: Option<u8>,
     /// For each layer, outermost first, whether it has a wall.
     pub(super) walls: Vec<bool>,
     /// Number and name of each layer to be spared.
@@ -40,6 +42,7 @@ impl Surroundings {
             skin_tilt_rad: profile.skin_tilt_rad(),
             target_depth_mm: ends.and_then(|goal| depth_mm(goal.layer)),
             target_layer: goal.map(|goal| usize::from(goal.layer)),
+            far_wall: profile.far_wall(),
             walls: profile.walls(),
             spared: profile.spared.iter().filter_map(|n| Some((*n, profile.layer_name(*n)?))).collect(),
             beside: profile.beside.clone(),
@@ -113,10 +116,6 @@ impl Course {
         let (layer, enters) = match event.kind {
             EventKind::Contact { layer } => (layer, false),
             EventKind::Puncture { layer } | EventKind::InTrack { layer } => (layer, true),
-            EventKind::FarWall { .. } => {
-                self.far_wall = self.far_wall.or(Some(event.tick));
-                return;
-            }
             EventKind::Exit { layer: 0 } => {
                 self.is_out = event.tick == self.end;
                 return;
@@ -128,6 +127,9 @@ impl Course {
         let is_there = track.tops_mm().get(number).is_some_and(Option::is_some);
         if layer == 0 && enters == has_wall && !matches!(event.kind, EventKind::InTrack { .. }) {
             self.skin.push(event.tick);
+        }
+        if enters == has_wall && is_there && around.far_wall == Some(layer) {
+            self.far_wall = self.far_wall.or(Some(event.tick));
         }
         if enters == has_wall
             && is_there

@@ -16,6 +16,7 @@ use control_core::TICK_HZ;
 use control_core::config::{Fixture, Law, Tissue};
 use control_core::controller::Sample;
 use course::{Course, Surroundings};
+use device_sim::device::virtual_device::SLOPE_BARRIER;
 use device_sim::error::Error;
 use device_sim::procedure::purpose::Purpose;
 use device_sim::profile::{Goal, Profile};
@@ -80,7 +81,7 @@ pub struct Insertion {
     /// The names of structures to be spared that were not touched.
     pub spared: Vec<String>,
     /// The number of times that the needle was turned beyond the largest angle that the patient's
-    /// fixture allows.
+    /// fixture allows, or came to a barrier of its slope.
     pub barriers: u32,
     /// Largest force across the needle that would have held its direction of entry, N; none where
     /// the patient has no fixture.
@@ -110,6 +111,14 @@ pub struct Insertion {
 
 /// The needle may pierce the skin again in the same attempt until it has been out for so long: 5 s.
 const AGAIN_TICKS: u64 = 5 * TICK_HZ as u64;
+
+/// Returns how often the needle was turned further than the tissue allows, or than the device's
+/// slope.
+fn barriers(span: Span<'_>) -> u32 {
+    let tissue = span.events().filter(|event| event.kind == EventKind::Barrier).count();
+    let within = span.stretch.tasks.iter().filter(|task| (span.begin..=span.end).contains(&task.tick));
+    (tissue + within.filter(|task| task.name == SLOPE_BARRIER).count()) as u32
+}
 
 /// True if the needle came into the vessel in these ticks.
 fn enters_vessel(stretch: &Stretch, (begin, end): (u64, u64)) -> bool {
@@ -355,7 +364,7 @@ impl Judge {
             verdict,
             hit,
             spared,
-            barriers: span.events().filter(|e| e.kind == EventKind::Barrier).count() as u32,
+            barriers: barriers(span),
             largest_lateral_n: self.lateral_n(inside),
             passes: passes.passes,
             redirections: passes.redirections,
