@@ -1,11 +1,11 @@
-//! The second stage: effects are added one after another as long as one generalises, and those that
-//! are rejected when all are judged together are taken out again.
+//! The second stage: effects are added one after another as long as one generalises to stretches of
+//! the fitted recordings that were left out of its fit. Held-out recordings are read once, when all
+//! are chosen: they take out what does not carry to them, and choose nothing.
 
 use super::Progress;
 use super::prepare::Prepared;
 use crate::evidence::effect_evidence::gather_evidence;
 use crate::evidence::elimination::{RejectedHypothesis, StandingModel, eliminate};
-use crate::evidence::holdout_likelihood::{compare, evaluate_all};
 use crate::evidence::holdout_set::HoldoutSet;
 use crate::evidence::parameters;
 use crate::evidence::rejection::Rejection;
@@ -18,6 +18,7 @@ use crate::fit::refit;
 use crate::fit::smoother::Knows;
 use crate::laws::{Effect, EffectName};
 use crate::propose::context::{FitContext, FittedModel, MOST};
+use crate::propose::predictive::left_out_costs;
 use crate::propose::{candidates, joint};
 use crate::thresholds::MIN_LOG_LIKELIHOOD_GAIN;
 use numerics::parallel;
@@ -52,19 +53,6 @@ pub(crate) fn search(prepared: &Prepared, progress: Progress) -> Found {
     let grown = search.forward_selection(search.start(), &mut tried);
     search.goes_on("judging on held-out recordings");
     let mut found = search.backward_elimination(grown);
-    let removed: Vec<EffectName> = found.standing.rejected.iter().map(|rejected| rejected.name).collect();
-    let is_any_removed = !removed.is_empty();
-    tried.excluded = removed;
-    if !found.standing.effects.is_empty() && is_any_removed {
-        // What went may have stood in the place of something else.
-        tried.count = 0;
-        let mut again =
-            search.backward_elimination(search.forward_selection(search.state(&found), &mut tried));
-        if again.standing.effects.len() > found.standing.effects.len() {
-            again.standing.rejected.splice(..0, found.standing.rejected);
-            found = again;
-        }
-    }
     found.standing.rejected.splice(..0, tried.rejected);
     found
 }
@@ -75,7 +63,8 @@ struct SearchState {
     white: FittedModel,
     slow: FittedModel,
     tracks: Vec<BlockedRecording>,
-    holdout: HoldoutSet,
+    /// The fitted recordings, in the motions in which recordings judge.
+    judging: HoldoutSet,
 }
 
 /// The candidates that were judged so far.
@@ -86,15 +75,13 @@ struct Tried {
     count: usize,
     /// True once plain forces were looked for together.
     plain: bool,
-    /// Effects that were found and taken out again: not looked at a second time.
-    excluded: Vec<EffectName>,
 }
 
 /// The model with one more effect.
 struct Next {
     state: SearchState,
-    /// True if the effect generalises to the held-out recordings; otherwise it is likely to
-    /// generalise together with another effect.
+    /// True if the effect generalises to what its fit left out; otherwise it is likely to generalise
+    /// together with another effect.
     generalises: bool,
 }
 
@@ -119,11 +106,12 @@ impl Search<'_> {
 
     /// The model without any effect.
     fn start(&self) -> SearchState {
-        let Prepared { fit, holdout, noise, .. } = self.prepared;
+        let Prepared { fit, noise, .. } = self.prepared;
         let context = self.context(fit);
         let white = context.fit(Model::default(), noise, Colour::White);
         let slow = context.fit_slow(Model::default(), &[noise, &white.noise]);
-        SearchState { white, slow, tracks: fit.clone(), holdout: holdout.clone() }
+        let judging = self.followed(&HoldoutSet::new(fit.clone()), &white);
+        SearchState { white, slow, tracks: fit.clone(), judging }
     }
 
     /// Adds effects one after another as long as one generalises.
@@ -145,30 +133,20 @@ impl Search<'_> {
 
     /// Removes the effects that do not generalise when all are judged together.
     fn backward_elimination(&self, now: SearchState) -> Found {
-        let SearchState { white, slow, tracks, holdout } = now;
+        let SearchState { white, slow, tracks, .. } = now;
+        let holdout = self.followed(&self.prepared.holdout, &white);
         let context = self.context(&tracks);
         let null = context.fit_slow(Model::default(), &[&self.prepared.noise, &white.noise]);
         let standing = eliminate(slow, &context, &holdout, &null.noise, &white.noise, &[]);
         Found { fit: tracks, holdout, null, standing }
     }
 
-    /// The model found, refitted to the motion that it implies.
-    fn state(&self, found: &Found) -> SearchState {
-        let context = self.context(&found.fit);
-        let last = &found.standing.model;
-        let fitted = context.fit(last.model.clone(), &self.prepared.noise, Colour::White);
-        let (tracks, white) = in_its_own_motion(&found.fit, fitted, &context);
-        let holdout = self.followed(&found.holdout, &white);
-        let slow = self.context(&tracks).fit_slow(white.model.clone(), &[&last.noise, &white.noise]);
-        SearchState { white, slow, tracks, holdout }
-    }
-
-    /// The held-out recordings in the motion of a model.
-    fn followed(&self, holdout: &HoldoutSet, model: &FittedModel) -> HoldoutSet {
+    /// Recordings that judge in the motion of a model.
+    fn followed(&self, judging: &HoldoutSet, model: &FittedModel) -> HoldoutSet {
         let Prepared { nominal, span, scale, .. } = self.prepared;
-        let mut holdout = holdout.clone();
-        holdout.follow(model, nominal, span, *scale);
-        holdout
+        let mut judging = judging.clone();
+        judging.follow(model, nominal, span, *scale);
+        judging
     }
 
     /// The model with one more effect, if there is one that generalises or, failing that, promises
@@ -176,7 +154,7 @@ impl Search<'_> {
     fn with_one_more(&self, now: &SearchState, tried: &mut Tried, most: usize) -> Option<Next> {
         let on = self.context(&now.tracks);
         self.goes_on(SEARCHING);
-        let candidates = on.screen(&now.white, &|name| !tried.excluded.contains(&name));
+        let candidates = on.screen(&now.white, &|_| true);
         self.goes_on(SEARCHING);
         let mut finalists = on.finalists(&now.white, &candidates);
         self.goes_on(SEARCHING);
@@ -197,7 +175,7 @@ impl Search<'_> {
             tried.count += 1;
             self.goes_on(SEARCHING);
             let name = finalist.model.effects.last().expect("a finalist adds an effect").name;
-            let finalist = self.with_enough_laws(&on, now, finalist);
+            let finalist = with_enough_laws(&on, finalist);
             match self.judge(now, finalist, promising.is_none()) {
                 Judged::Generalises(state) => return Some(Next { state, generalises: true }),
                 Judged::Rejected { holdout_gain, why, provisional } => {
@@ -208,17 +186,6 @@ impl Search<'_> {
             }
         }
         promising
-    }
-
-    /// Returns the candidate, or its rival with one periodic law fewer where the held-out
-    /// recordings are as likely with that.
-    fn with_enough_laws(&self, on: &FitContext, now: &SearchState, candidate: FittedModel) -> FittedModel {
-        let Some(rival) = on.with_fewer_laws(&candidate) else { return candidate };
-        let evaluated = |one: &FittedModel| {
-            evaluate_all(one, on.nominal, &now.holdout.judging(&one.model, on.span), &one.noise)
-        };
-        let gain = compare(&evaluated(&rival), &evaluated(&candidate)).sum;
-        if gain >= 0.0 { rival } else { candidate }
     }
 
     /// Judges a model with one more effect; where it is rejected and `may_promise`, it is kept if
@@ -235,14 +202,14 @@ impl Search<'_> {
         }
         let (tracks, white) = in_its_own_motion(&now.tracks, finalist, &on);
         let own = self.context(&tracks);
-        let holdout = self.followed(&now.holdout, &white);
+        let judging = self.followed(&now.judging, &white);
         let judged =
-            gather_evidence(&own, &white, &with.noise, &holdout).pop().expect("the last effect is judged");
+            gather_evidence(&own, &white, &with.noise, &judging).pop().expect("the last effect is judged");
         let last = white.model.effects.len() - 1;
         let rejection = judged.rejection().or_else(|| parameters::absence(&own, &white, last));
         let is_kept = rejection.is_none() || (may_promise && judged.is_provisional());
         let slow = is_kept.then(|| own.fit_slow(white.model.clone(), &[&with.noise, &white.noise]));
-        let state = slow.map(|slow| SearchState { white, slow, tracks, holdout });
+        let state = slow.map(|slow| SearchState { white, slow, tracks, judging });
         match (rejection, state) {
             (None, Some(state)) => Judged::Generalises(state),
             (why, provisional) => Judged::Rejected {
@@ -268,17 +235,25 @@ impl Search<'_> {
             }
             let (tracks, white) = in_its_own_motion(&now.tracks, white, &on);
             let own = self.context(&tracks);
-            let holdout = self.followed(&now.holdout, &white);
+            let judging = self.followed(&now.judging, &white);
             let slow = own.fit_slow(white.model.clone(), &[&now.slow.noise, &white.noise]);
-            let judged = gather_evidence(&own, &white, &slow.noise, &holdout);
+            let judged = gather_evidence(&own, &white, &slow.noise, &judging);
             let is_there = |place: usize| parameters::absence(&own, &white, place).is_none();
             if judged.iter().all(|judged| judged.rejection().is_none()) && (0..judged.len()).all(is_there) {
-                let state = SearchState { white, slow, tracks, holdout };
+                let state = SearchState { white, slow, tracks, judging };
                 return Some(Next { state, generalises: true });
             }
         }
         None
     }
+}
+
+/// Returns the candidate, or its rival with one periodic law fewer where the stretches that a fit
+/// leaves out are as likely with that.
+fn with_enough_laws(on: &FitContext, candidate: FittedModel) -> FittedModel {
+    let Some(rival) = on.with_fewer_laws(&candidate) else { return candidate };
+    let cost = |one: &FittedModel| left_out_costs(&one.fit).iter().sum::<f64>();
+    if cost(&rival) <= cost(&candidate) { rival } else { candidate }
 }
 
 /// The judgement of a model with one more effect.

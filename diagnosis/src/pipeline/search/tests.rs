@@ -53,7 +53,7 @@ fn decided(machine: &Rig) -> Vec<(N, usize)> {
     let ripple = Effect::of_orders(N::TorqueRipple, TAU, &[10.0]);
     let candidate =
         on.fit(Model { effects: vec![cogging, ripple], ..Model::default() }, &now.white.noise, Colour::White);
-    let chosen = search.with_enough_laws(&on, &now, candidate);
+    let chosen = with_enough_laws(&on, candidate);
     chosen.model.effects.iter().map(|one| (one.name, one.waves().len())).collect()
 }
 
@@ -75,4 +75,22 @@ fn waves_of_cogging_beside_a_steady_command_are_no_ripple() {
 fn a_ripple_beside_cogging_stays_a_ripple() {
     let machine = rig(&(wave("cogging", 6, 0.01) + &wave("torque_ripple", 10, 0.2)));
     assert_eq!(decided(&machine), [(N::Cogging, 1), (N::TorqueRipple, 1)]);
+}
+
+#[test]
+fn held_out_recordings_choose_nothing() {
+    let machine = rig(&(wave("cogging", 6, 0.01) + &wave("cogging", 10, 0.005)));
+    let fit = [turned_slowly(&machine, 1.0), turned_slowly(&machine, 1.2)];
+    let chosen = |holdout: &[Recording]| {
+        let checked = Checked::unchanged(&fit, holdout);
+        let prepared = prepare(&rig(""), &checked, Some(0.0), &|_, _| ());
+        let search = Search { prepared: &prepared, progress: &|_, _| (), done: Cell::new(0.0) };
+        search.forward_selection(search.start(), &mut Tried::default()).white.model.effects
+    };
+    let of_the_machine = chosen(&[turned_slowly(&machine, 0.8)]);
+    assert!(!of_the_machine.is_empty(), "the fitted recordings show something");
+    let other = rig("[[effect]]\nname = \"quadratic_drag\"\n[effect.coefficients]\ncoefficient = 0.05\n");
+    let mut scrambled = turned_slowly(&other, 0.8);
+    scrambled.command.reverse();
+    assert_eq!(chosen(&[scrambled]), of_the_machine);
 }
