@@ -28,7 +28,14 @@ pub(super) struct Twin {
     still: u32,
     furthest: f64,
     direction: f64,
+    /// Whether rounding has decided if a resting needle goes on: a count's time apart is seen in
+    /// the force.
+    pub(super) is_tied: bool,
 }
+
+/// Stretch of the wall at which a resting needle goes on, and how much of it the core rounds: a
+/// wall's reach of 10 mm by 1/K in Q16. Both in mm.
+const GOES_ON: (f64, f64) = (0.15, 2e-4);
 
 impl Twin {
     pub(super) fn new(config: &Config) -> Self {
@@ -54,6 +61,7 @@ impl Twin {
             still: 0,
             furthest: 0.0,
             direction: 0.0,
+            is_tied: false,
         }
     }
 
@@ -128,7 +136,10 @@ impl Twin {
         let stretch = x - self.wall;
         let (least, ticks) = self.rest.unwrap_or((f64::MAX, 0));
         let least = least.min(stretch.abs());
-        let goes_on = self.is_turning || stretch.abs() > least + 0.15;
+        let beyond = stretch.abs() - least - GOES_ON.0;
+        self.is_tied |=
+            self.rest.is_some() && !self.has_stopped && !self.is_turning && beyond.abs() < GOES_ON.1;
+        let goes_on = self.is_turning || beyond > 0.0;
         let rests = self.has_stopped || self.rest.is_some() && !goes_on;
         self.rest = rests.then_some((least, ticks + 1));
         if rests && stretch.abs() > held {
