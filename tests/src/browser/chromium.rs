@@ -1,8 +1,8 @@
 //! Chromium as a process of our own: a fresh profile, no screen, nothing in the background, ended
 //! with its test.
 
-use super::Error;
 use super::devtools::DevTools;
+use super::{Error, PATIENCE};
 use std::fs;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
@@ -12,8 +12,6 @@ use std::time::{Duration, Instant};
 
 /// The paths on Debian and Ubuntu.
 const PROGRAMS: &[&str] = &["/usr/bin/chromium", "/usr/bin/chromium-browser"];
-/// A first start with a fresh profile on a busy machine.
-const START_TIMEOUT: Duration = Duration::from_secs(60);
 /// Time to close by itself before it is ended.
 const CLOSE_TIMEOUT: Duration = Duration::from_secs(5);
 const ARGUMENTS: &[&str] = &[
@@ -128,6 +126,6 @@ fn announced(process: &mut Child) -> Result<String, Error> {
         let _ = sender.send(Err(format!("the browser ended before it was ready; it said last: {last}")));
     });
     receiver
-        .recv_timeout(START_TIMEOUT)
-        .unwrap_or_else(|_| Err(format!("the browser was not ready within {} s", START_TIMEOUT.as_secs())))
+        .recv_timeout(PATIENCE)
+        .unwrap_or_else(|_| Err(format!("the browser was not ready within {} s", PATIENCE.as_secs())))
 }

@@ -1,14 +1,12 @@
 //! The DevTools protocol as far as a test needs it: a call and its answer, and the events that
 //! arrive in between.
 
-use super::Error;
+use super::{Error, PATIENCE};
 use serde_json::{Value, json};
 use std::net::TcpStream;
 use std::time::{Duration, Instant};
 use tungstenite::{Message, WebSocket};
 
-/// Longest wait for an answer.
-const ANSWER_TIMEOUT: Duration = Duration::from_secs(30);
 /// Wait for one message, so that a timeout is noticed.
 const READ_TIMEOUT: Duration = Duration::from_millis(50);
 
@@ -28,7 +26,7 @@ impl DevTools {
     pub fn connect(address: &str) -> Result<Self, Error> {
         let host = address.strip_prefix("ws://").and_then(|rest| rest.split('/').next()).unwrap_or_default();
         let stream = TcpStream::connect(host).map_err(|e| format!("no DevTools at {host}: {e}"))?;
-        let ready = stream.set_nodelay(true).and_then(|()| stream.set_read_timeout(Some(ANSWER_TIMEOUT)));
+        let ready = stream.set_nodelay(true).and_then(|()| stream.set_read_timeout(Some(PATIENCE)));
         ready.map_err(|e| e.to_string())?;
         let (socket, _) = tungstenite::client(address, stream).map_err(|e| format!("DevTools: {e}"))?;
         socket.get_ref().set_read_timeout(Some(READ_TIMEOUT)).map_err(|e| e.to_string())?;
@@ -55,7 +53,7 @@ impl DevTools {
         let sent = self.socket.send(Message::text(message.to_string()));
         sent.map_err(|e| format!("{method}: {e}"))?;
         let begin = Instant::now();
-        while begin.elapsed() < ANSWER_TIMEOUT {
+        while begin.elapsed() < PATIENCE {
             let Some(mut message) = self.receive()? else { continue };
             if message["id"] == json!(self.last_id) {
                 return match message.get("error") {
@@ -65,7 +63,7 @@ impl DevTools {
             }
             self.events.push(message);
         }
-        Err(format!("{method}: no answer within {} s", ANSWER_TIMEOUT.as_secs()))
+        Err(format!("{method}: no answer within {} s", PATIENCE.as_secs()))
     }
 
     /// Events that have arrived since the last time, oldest first.

@@ -16,6 +16,12 @@ pub use page::Page;
 pub use processor_time::loop_time;
 pub use program::{Places, Program};
 
+use std::time::Duration;
+
+/// Long enough for whatever a test waits for, on a machine that has little time for it; what comes
+/// sooner is waited for no longer.
+pub const PATIENCE: Duration = Duration::from_secs(180);
+
 /// The browser's error, in one sentence.
 pub type Error = String;
 

@@ -1,7 +1,7 @@
 //! A page in a tab: what a test does with it and what it reads from it.
 
 use super::devtools::DevTools;
-use super::{Chromium, Error};
+use super::{Chromium, Error, PATIENCE};
 use serde_json::{Value, json};
 use std::time::{Duration, Instant};
 
@@ -74,9 +74,9 @@ impl Page {
     }
 
     /// Waits until an expression is true; what was waited for where it does not become so.
-    pub fn wait(&mut self, what: &str, limit: Duration, expression: &str) -> Result<(), Error> {
+    pub fn wait(&mut self, what: &str, expression: &str) -> Result<(), Error> {
         let begin = Instant::now();
-        while begin.elapsed() < limit {
+        while begin.elapsed() < PATIENCE {
             // A page that is just being loaded has not everything yet.
             if self.evaluate(expression).is_ok_and(|value| value == json!(true)) {
                 return Ok(());
@@ -84,7 +84,7 @@ impl Page {
             std::thread::sleep(Duration::from_millis(20));
         }
         let state = self.text("document.body.innerText").unwrap_or_default().replace('\n', " | ");
-        Err(format!("{what}: not within {} s; the page shows: {state}", limit.as_secs()))
+        Err(format!("{what}: not within {} s; the page shows: {state}", PATIENCE.as_secs()))
     }
 
     /// Middle of the element with `id` in CSS pixels.

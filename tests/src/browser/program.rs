@@ -1,14 +1,11 @@
 //! The program under test: found next to the test, started, asked where its page is, and ended.
 
-use super::Error;
+use super::{Error, PATIENCE};
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::mpsc;
 use std::time::{Duration, Instant};
-
-/// A start on a busy machine.
-const START: Duration = Duration::from_secs(60);
 
 /// The locations of programs and pages, relative to the test itself:
 /// `target/release/deps/browser-…`.
@@ -81,7 +78,7 @@ impl Program {
                 let _ = address.map(|address| sender.send(address.to_owned()));
             }
         });
-        program.url = receiver.recv_timeout(START).map_err(|_| "the program printed no address")?;
+        program.url = receiver.recv_timeout(PATIENCE).map_err(|_| "the program printed no address")?;
         Ok(program)
     }
 
@@ -92,14 +89,14 @@ impl Program {
     }
 
     /// Waits until it has ended by itself, without a failure.
-    pub fn ended(&mut self, limit: Duration) -> Result<(), Error> {
+    pub fn ended(&mut self) -> Result<(), Error> {
         let begin = Instant::now();
         loop {
             match self.process.try_wait() {
                 Ok(Some(status)) if status.success() => return Ok(()),
                 Ok(Some(status)) => return Err(format!("the program failed ({status})")),
-                Ok(None) if begin.elapsed() > limit => {
-                    return Err(format!("the program goes on after {} s", limit.as_secs()));
+                Ok(None) if begin.elapsed() > PATIENCE => {
+                    return Err(format!("the program goes on after {} s", PATIENCE.as_secs()));
                 }
                 Ok(None) => std::thread::sleep(Duration::from_millis(20)),
                 Err(error) => return Err(format!("the program was lost: {error}")),

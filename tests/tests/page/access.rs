@@ -1,7 +1,7 @@
 //! Stop is never covered, keys stop the torque, and axe-core finds nothing to complain about: at
 //! every size, in every state of the page, light and dark.
 
-use crate::needle::{SIZES, SOON, Size, complaints, open, pictures, resize};
+use crate::needle::{SIZES, Size, complaints, open, pictures, resize};
 use serde_json::json;
 use std::path::Path;
 use tests::browser::{Chromium, Error, Page, Places, Program, check};
@@ -54,7 +54,7 @@ fn stop_is_on_top(page: &mut Page, size: Size, scratch: &Path) -> Result<(), Err
         hit(page, size, view)?;
         for opener in OPENERS {
             page.evaluate(&format!("document.getElementById('{opener}').click()"))?;
-            page.wait("a dialog", SOON, "document.querySelector('dialog[open]') !== null")?;
+            page.wait("a dialog", "document.querySelector('dialog[open]') !== null")?;
             pictures(page, 2)?;
             hit(page, size, opener)?;
             page.evaluate("scrollTo(0, document.documentElement.scrollHeight)")?;
@@ -78,10 +78,10 @@ fn hit(page: &mut Page, size: Size, what: &str) -> Result<(), Error> {
 /// Escape stops and closes; Space stops, but not where a control has the focus.
 fn keys(page: &mut Page) -> Result<(), Error> {
     page.click("patient")?;
-    page.wait("the editor", SOON, "document.querySelector('dialog[open]') !== null")?;
+    page.wait("the editor", "document.querySelector('dialog[open]') !== null")?;
     page.evaluate("document.querySelector('#patient-editor input').focus()")?;
     page.press("Escape", "Escape", 27)?;
-    page.wait("a stop from within a dialog", SOON, STOPPED)?;
+    page.wait("a stop from within a dialog", STOPPED)?;
     let closed = page.evaluate("document.querySelector('dialog[open]') === null")?;
     check("the dialog is closed", closed == json!(true), "open")?;
     start(page)?;
@@ -94,8 +94,8 @@ fn keys(page: &mut Page) -> Result<(), Error> {
     }
     page.evaluate("document.activeElement.blur()")?;
     page.press(" ", "Space", 32)?;
-    page.wait("a stop by Space", SOON, STOPPED)?;
-    page.wait("one more stop in the list", SOON, &format!("{stops} > {before}"))?;
+    page.wait("a stop by Space", STOPPED)?;
+    page.wait("one more stop in the list", &format!("{stops} > {before}"))?;
     let after = page.number(stops)?;
     check("one stop, not by the control", after == before + 1.0, (before, after))?;
     page.evaluate("document.querySelector('dialog[open]')?.close()")?;
@@ -103,9 +103,9 @@ fn keys(page: &mut Page) -> Result<(), Error> {
 }
 
 fn start(page: &mut Page) -> Result<(), Error> {
-    page.wait("Start to be had", SOON, "!document.getElementById('start').disabled")?;
+    page.wait("Start to be had", "!document.getElementById('start').disabled")?;
     page.click("start")?;
-    page.wait("a start", SOON, RUNNING)
+    page.wait("a start", RUNNING)
 }
 
 #[test]

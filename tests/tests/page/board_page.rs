@@ -13,9 +13,8 @@ use link::frames::HostFrame;
 use serde_json::{Value, json};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
-use tests::browser::{Chromium, Error, Page, Places, check};
+use tests::browser::{Chromium, Error, PATIENCE, Page, Places, check};
 
-const SOME_TIME: Duration = Duration::from_secs(60);
 /// The most that the device's time goes on between two exchanges with the page: it is never ahead
 /// of the page's clock, whose heartbeat it awaits.
 const AT_ONCE: Duration = Duration::from_millis(40);
@@ -44,7 +43,7 @@ impl Bench {
         let scratch = places.scratch(name)?;
         let browser = Chromium::start(&scratch)?;
         let mut page = Page::open(&browser, &format!("file://{}", site.display()), 1_440, 900, false)?;
-        page.wait("the page", SOME_TIME, "'ready' in document.body.dataset")?;
+        page.wait("the page", "'ready' in document.body.dataset")?;
         page.evaluate(&format!("window.mockMemory = {}; {MOCK}", json!(MEMORY)))?;
         Ok(Self {
             page,
@@ -61,7 +60,7 @@ impl Bench {
     /// Carries bytes to and fro until an expression of the page is true.
     fn until(&mut self, what: &str, expression: &str) -> Result<(), Error> {
         let begin = Instant::now();
-        while begin.elapsed() < SOME_TIME {
+        while begin.elapsed() < PATIENCE {
             let mut heard = Vec::new();
             std::thread::sleep(Duration::from_millis(2));
             let since = std::mem::replace(&mut self.exchanged, Instant::now()).elapsed().min(AT_ONCE);
@@ -82,7 +81,7 @@ impl Bench {
             }
         }
         let state = self.page.text("document.body.innerText")?.replace('\n', " | ");
-        Err(format!("{what}: not within {} s; the page shows: {state}", SOME_TIME.as_secs()))
+        Err(format!("{what}: not within {} s; the page shows: {state}", PATIENCE.as_secs()))
     }
 
     fn connect(&mut self) -> Result<(), Error> {
@@ -180,12 +179,12 @@ fn pull() -> Result<(), Error> {
     }
     bench.until("the pulses", "mock.state.out.length === 0 && document.querySelector('.step:nth-child(6)[data-stage=running]') !== null")?;
     let begin = Instant::now();
-    while !bench.gives_torque() && begin.elapsed() < SOME_TIME {
+    while !bench.gives_torque() && begin.elapsed() < PATIENCE {
         bench.until("an exchange", "true")?;
     }
     check("the pulses have begun", bench.gives_torque(), &bench.commands)?;
     bench.page.evaluate("mock.pull()")?;
-    bench.page.wait("the end of the connection", SOME_TIME, "document.body.dataset.port === 'closed'")?;
+    bench.page.wait("the end of the connection", "document.body.dataset.port === 'closed'")?;
     let said = bench.page.text("document.getElementById('banner').textContent")?;
     check("it says so", said.contains("gone"), said)?;
     bench.line = uncommissioned();
@@ -214,7 +213,7 @@ fn update() -> Result<(), Error> {
     let mut bootloader = Bootloader::default();
     let file = dfuse(FLASH, &image());
     bench.page.evaluate(&format!("mock.choose({})", json!(file)))?;
-    bench.page.wait("the button", SOME_TIME, "!document.getElementById('update').disabled")?;
+    bench.page.wait("the button", "!document.getElementById('update').disabled")?;
     bench.page.evaluate("document.getElementById('update').click()")?;
     let mut answer = json!(null);
     loop {

@@ -3,10 +3,8 @@
 //! over the skin.
 
 use serde_json::Value;
-use std::time::Duration;
 use tests::browser::{Chromium, Error, Page, Places, Program, check};
 
-const SOON: Duration = Duration::from_secs(40);
 const DRAWN: &str = "__body.frames > 5 && document.getElementById('body-note').textContent === ''";
 
 #[test]
@@ -22,24 +20,20 @@ fn visit() -> Result<(), Error> {
     let browser = Chromium::start(&scratch)?;
     let program = Program::start_with(&places.program, &["run", "--port", "0", "--profile", "forearm"])?;
     let mut page = Page::open(&browser, &program.url, 1_440, 900, false)?;
-    page.wait("live data", SOON, "document.body.dataset.link === 'live' && !isNaN(__stats.firstFrameMs)")?;
+    page.wait("live data", "document.body.dataset.link === 'live' && !isNaN(__stats.firstFrameMs)")?;
     page.click("view-body")?;
-    page.wait("the forearm", SOON, &format!("{DRAWN} && {}", meets("vein")))?;
+    page.wait("the forearm", &format!("{DRAWN} && {}", meets("vein")))?;
     page.photograph(&scratch.join("forearm.png"))?;
     for (site, structure) in [("knee", "quadriceps"), ("hip", "gluteus"), ("shoulder", "rotator cuff")] {
         choose(&mut page, site)?;
-        page.wait(
-            site,
-            SOON,
-            &format!("{DRAWN} && __body.entry?.name === '{site}' && {}", meets(structure)),
-        )?;
-        page.wait("the needle in it", SOON, "__stats.depthMm > 10")?;
+        page.wait(site, &format!("{DRAWN} && __body.entry?.name === '{site}' && {}", meets(structure)))?;
+        page.wait("the needle in it", "__stats.depthMm > 10")?;
         page.photograph(&scratch.join(format!("{site}.png")))?;
     }
     entry_and_turn(&mut page)?;
     by_pointer(&mut page)?;
     page.click("view-section")?;
-    page.wait("the section", SOON, "document.getElementById('section').clientHeight > 100")?;
+    page.wait("the section", "document.getElementById('section').clientHeight > 100")?;
     page.photograph(&scratch.join("section.png"))?;
     let complaints = page.complaints()?;
     check("no errors in the console", complaints.is_empty(), &complaints)
@@ -66,7 +60,7 @@ fn slide(page: &mut Page, id: &str, value: i32) -> Result<Value, Error> {
 /// skin of the picture slopes as the limb turns.
 fn entry_and_turn(page: &mut Page) -> Result<(), Error> {
     slide(page, "needle-depth", 6)?;
-    page.wait("a person's needle inside", SOON, "__stats.depthMm > 2")?;
+    page.wait("a person's needle inside", "__stats.depthMm > 2")?;
     let level = page.number("__body.skinBesideMm")?;
     for (id, value) in [("place-along", 30), ("place-around", 39), ("place-azimuth", 0), ("place-turn", -39)]
     {
@@ -75,27 +69,22 @@ fn entry_and_turn(page: &mut Page) -> Result<(), Error> {
     slide(page, "angle", 85)?;
     page.wait(
         "the needle drawn out and the vein on its line",
-        SOON,
         &format!("__stats.depthMm < 0 && {}", meets("vein")),
     )?;
     slide(page, "place-turn", -15)?;
-    page.wait("the limb turned", SOON, "__body.entry.turn_deg === -15")?;
+    page.wait("the limb turned", "__body.entry.turn_deg === -15")?;
     let turned = page.number("__body.skinBesideMm")?;
     check("the drawn skin slopes with the limb", (turned - level).abs() > 2.0, (level, turned))?;
     // Along the sky: refused with its reason, and the line that counts stays.
     slide(page, "place-turn", 80)?;
-    page.wait(
-        "a reason",
-        SOON,
-        "document.getElementById('place-note').textContent.includes('turn the limb')",
-    )?;
-    page.wait("the slider back", SOON, "document.getElementById('place-turn').value === '-15'")
+    page.wait("a reason", "document.getElementById('place-note').textContent.includes('turn the limb')")?;
+    page.wait("the slider back", "document.getElementById('place-turn').value === '-15'")
 }
 
 /// A click on the skin enters there, and the probe follows a pointer that takes it.
 fn by_pointer(page: &mut Page) -> Result<(), Error> {
     slide(page, "place-turn", -39)?;
-    page.wait("the limb back", SOON, "__body.entry.turn_deg === -39")?;
+    page.wait("the limb back", "__body.entry.turn_deg === -39")?;
     let find = |page: &mut Page, wanted: &str| -> Result<(f64, f64), Error> {
         let script = format!(
             "(() => {{ const box = document.getElementById('limb').getBoundingClientRect();
@@ -119,12 +108,11 @@ fn by_pointer(page: &mut Page) -> Result<(), Error> {
     page.mouse("mouseReleased", away)?;
     page.wait(
         "the probe there",
-        SOON,
         &format!("Math.hypot(__body.probe.along - {along}, __body.probe.across - {across}) < 3"),
     )?;
     let entry = find(page, "at.place[0] < -12 && Math.abs(at.place[1]) > 6")?;
     let wanted = page.number(&format!("__body.sight({}, {}).along", entry.0, entry.1))?;
     page.mouse("mousePressed", entry)?;
     page.mouse("mouseReleased", entry)?;
-    page.wait("the entry where one clicked", SOON, &format!("Math.abs(__body.entry.along_mm - {wanted}) < 2"))
+    page.wait("the entry where one clicked", &format!("Math.abs(__body.entry.along_mm - {wanted}) < 2"))
 }

@@ -22,9 +22,6 @@ use watch::watch;
 
 const DESKTOP: (u32, u32) = (1440, 900);
 const PHONE: (u32, u32) = (390, 844);
-const SOON: Duration = Duration::from_secs(10);
-/// The scripted venepuncture takes 6 s; a busy machine may be slow to begin.
-const A_FEW_INSERTIONS: Duration = Duration::from_secs(40);
 /// The entry angle of every default profile.
 const TILT_RAD: f64 = std::f64::consts::FRAC_PI_6;
 
@@ -82,16 +79,14 @@ fn come_back(page: &mut Page, program: &mut Program, path: &Path) -> Result<(), 
     program.end();
     page.wait(
         "a word about the missing program",
-        SOON,
         "document.body.dataset.link === 'lost' && /no data for [2-9] s/.test(document.getElementById('banner').textContent)",
     )?;
     *program = Program::start(path, program.port()?, None)?;
     page.wait(
         "the page back",
-        SOON,
         "document.body.dataset.link === 'live' && document.getElementById('banner').hidden",
     )?;
-    page.wait("the needle deep again", A_FEW_INSERTIONS, "__stats.depthMm > 6")?;
+    page.wait("the needle deep again", "__stats.depthMm > 6")?;
     // The browser itself notes each attempt to reach a program that is not there; nothing else may
     // be noted.
     let complaints: Vec<_> =
@@ -102,7 +97,7 @@ fn come_back(page: &mut Page, program: &mut Program, path: &Path) -> Result<(), 
 /// A phone: nothing sticks out, the stop is in reach, a finger drags.
 fn phone(browser: &Chromium, url: &str, told: &str, scratch: &Path) -> Result<(), Error> {
     let mut page = Page::open(browser, url, PHONE.0, PHONE.1, true)?;
-    page.wait("live data", SOON, "document.body.dataset.link === 'live' && !isNaN(__stats.firstFrameMs)")?;
+    page.wait("live data", "document.body.dataset.link === 'live' && !isNaN(__stats.firstFrameMs)")?;
     let told_later = page.text(FIRST_PUNCTURE)?;
     check("what happened before it was opened, in the same words", told == told_later, (told, &told_later))?;
     let width = page.number("document.documentElement.scrollWidth")?;
@@ -110,7 +105,7 @@ fn phone(browser: &Chromium, url: &str, told: &str, scratch: &Path) -> Result<()
     let stop = "document.getElementById('stop').getBoundingClientRect()";
     let (top, bottom) = (page.number(&format!("{stop}.top"))?, page.number(&format!("{stop}.bottom"))?);
     check("the stop on the screen", top > 0.0 && bottom <= f64::from(PHONE.1), (top, bottom))?;
-    page.wait("the needle outside", A_FEW_INSERTIONS, "__stats.depthMm < -3")?;
+    page.wait("the needle outside", "__stats.depthMm < -3")?;
     let before = page.number("__stats.depthMm")?;
     let mut at = page.middle("section")?;
     page.touch("touchStart", at)?;
@@ -119,7 +114,7 @@ fn phone(browser: &Chromium, url: &str, told: &str, scratch: &Path) -> Result<()
         page.touch("touchMove", at)?;
         std::thread::sleep(Duration::from_millis(20));
     }
-    page.wait("the needle to follow the finger", SOON, &format!("__stats.depthMm > {before} + 1"))?;
+    page.wait("the needle to follow the finger", &format!("__stats.depthMm > {before} + 1"))?;
     page.touch("touchEnd", at)?;
     page.photograph(&scratch.join("phone.png"))?;
     page.click("demo")?;

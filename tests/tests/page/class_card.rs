@@ -1,7 +1,7 @@
 //! The card of a trainee on the page of a class: goal and reasons are read whole, in three
 //! languages, on a desktop, a tablet and a phone.
 
-use crate::needle::{SOON, Size};
+use crate::needle::Size;
 use std::io::{BufRead, BufReader, Write};
 use std::net::{TcpListener, TcpStream};
 use std::path::Path;
@@ -47,9 +47,9 @@ fn visit() -> Result<(), Error> {
     ] {
         page.languages(language)?;
         page.evaluate("window.__old = true, location.reload()")?;
-        page.wait("the page anew", SOON, "!window.__old && Boolean(window.socket?.onmessage)")?;
+        page.wait("the page anew", "!window.__old && Boolean(window.socket?.onmessage)")?;
         page.evaluate(MEMBER)?;
-        page.wait("a card", SOON, "document.querySelectorAll('.card').length === 1")?;
+        page.wait("a card", "document.querySelectorAll('.card').length === 1")?;
         let text = page.text("document.querySelector('[data-figure=reasons]').textContent")?;
         check(
             &format!("{language}: the reasons are in the language"),

@@ -2,7 +2,7 @@
 //! picture, a step taken back, a name. It can be chosen in another run and the needle is driven
 //! into it.
 
-use crate::needle::{A_FEW_INSERTIONS, SIZES, SOON, complaints, open, pictures, resize};
+use crate::needle::{SIZES, complaints, open, pictures, resize};
 use std::path::Path;
 use std::time::{Duration, Instant};
 use tests::browser::{Chromium, Error, Page, Places, Program, check};
@@ -31,7 +31,7 @@ fn visit() -> Result<(), Error> {
     save(&mut page, "anna", "anna.toml")?;
     check("a patient within a minute", begin.elapsed() < A_MINUTE, begin.elapsed())?;
     let subtitle = "document.getElementById('subtitle').textContent.includes('Profile anna ')";
-    page.wait("the patient that counts", SOON, subtitle)?;
+    page.wait("the patient that counts", subtitle)?;
     driven(&mut page)?;
     save(&mut page, "anna", "anna-2.toml")?;
     too_firm(&mut page)?;
@@ -71,7 +71,6 @@ fn shape(page: &mut Page) -> Result<(), Error> {
     page.click("patient")?;
     page.wait(
         "the editor",
-        SOON,
         "document.getElementById('patient-editor').open && !document.getElementById('patient-shape').hidden",
     )?;
     pictures(page, 2)?;
@@ -107,7 +106,6 @@ fn save(page: &mut Page, name: &str, file: &str) -> Result<(), Error> {
     page.click("patient-save")?;
     page.wait(
         "the patient saved",
-        SOON,
         &format!(
             "{ANSWER}.dataset.tone === 'good' && /^Saved as patients.{file}; /.test({ANSWER}.textContent)"
         ),
@@ -126,8 +124,8 @@ fn driven(page: &mut Page) -> Result<(), Error> {
             "[...document.querySelectorAll('#events [data-kind=puncture] span')].some(e => /^{layer} punctured at .*, {force}\\sN$/.test(e.textContent))"
         )
     };
-    page.wait("the skin at its force", A_FEW_INSERTIONS, &pierced("Skin", "1\\.[23]\\d"))?;
-    page.wait("the vein", A_FEW_INSERTIONS, &pierced("Vessel", "\\d\\.\\d\\d"))
+    page.wait("the skin at its force", &pierced("Skin", "1\\.[23]\\d"))?;
+    page.wait("the vein", &pierced("Vessel", "\\d\\.\\d\\d"))
 }
 
 /// Tests that the slider refuses what the device cannot render, in its words.
@@ -138,12 +136,11 @@ fn too_firm(page: &mut Page) -> Result<(), Error> {
     )?;
     page.wait(
         "a refusal at the slider",
-        SOON,
         "document.getElementById('patient-skin').getAttribute('aria-invalid') === 'true' && \
          /^Skin: .* make it softer, to .* at most\\.$/.test(document.getElementById('patient-wrong').textContent)",
     )?;
     page.click("patient-undo")?;
-    page.wait("the mark gone", SOON, "document.getElementById('patient-wrong') === null")
+    page.wait("the mark gone", "document.getElementById('patient-wrong') === null")
 }
 
 /// Another run in the same folder has the patient.
@@ -154,11 +151,7 @@ fn tomorrow(browser: &Chromium, path: &Path, folder: &Path) -> Result<(), Error>
     page.evaluate(
         "(() => { const c = document.getElementById('patient-choice'); c.value = 'anna'; c.dispatchEvent(new Event('change')); })()",
     )?;
-    page.wait(
-        "the patient of yesterday",
-        SOON,
-        &format!("{ANSWER}.textContent === 'The device has taken it.'"),
-    )?;
+    page.wait("the patient of yesterday", &format!("{ANSWER}.textContent === 'The device has taken it.'"))?;
     let depth = value(&mut page, "depth")?;
     check("as it was shaped", depth == "6.5 mm", depth)?;
     driven(&mut page)

@@ -2,11 +2,8 @@
 //! picture as by WebGL 2, and where the graphics processor is lost the page goes on with WebGL 2.
 
 use serde_json::Value;
-use std::time::Duration;
 use tests::browser::{Chromium, Error, Page, Places, Program};
 
-/// A start on a busy machine.
-const SOME_TIME: Duration = Duration::from_secs(60);
 const COMPARE: &str = include_str!("graphics.js");
 /// Keeps the page's device where this test finds it.
 const KEEP_DEVICE: &str = "{
@@ -27,14 +24,14 @@ fn visit() -> Result<(), Error> {
     let browser = Chromium::start_with_webgpu(&scratch)?;
     let program = Program::start(&places.program, 0, None)?;
     let mut page = Page::open(&browser, &format!("{}?graphics=webgpu", program.url), 1_440, 900, false)?;
-    page.wait("a needle", SOME_TIME, "__stats.depthMm > -100")?;
+    page.wait("a needle", "__stats.depthMm > -100")?;
     same_picture(&page.evaluate(COMPARE)?)?;
     page.evaluate(KEEP_DEVICE)?;
     page.click("view-body")?;
-    page.wait("WebGPU in the page", SOME_TIME, "__body.graphics === 'webgpu' && __body.frames > 5")?;
+    page.wait("WebGPU in the page", "__body.graphics === 'webgpu' && __body.frames > 5")?;
     page.evaluate("window.before = __body.frames, device.destroy()")?;
     let on = "__body.graphics === 'webgl2' && __body.frames > before + 20";
-    page.wait("WebGL instead", SOME_TIME, on)?;
+    page.wait("WebGL instead", on)?;
     page.photograph(&scratch.join("after-loss.png"))?;
     let note = page.text("document.getElementById('body-note').textContent")?;
     if note.is_empty() { Ok(()) } else { Err(format!("the page says: {note}")) }

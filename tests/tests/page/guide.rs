@@ -6,8 +6,6 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 use tests::browser::{Chromium, Error, Page, Places, Program, check};
 
-/// A start on a busy machine.
-const SOME_TIME: Duration = Duration::from_secs(60);
 /// Steps of commissioning.
 const STEPS: usize = 5;
 /// A step waits for its press.
@@ -53,19 +51,19 @@ fn commission() -> Result<(), Error> {
     let mut program = Program::start_with(&places.program, &["commission", "--page", "--port", "0"])?;
     let mut page = Page::open(&browser, &program.url, 390, 844, true)?;
     let asked = "document.querySelectorAll('.step').length === 1 && document.querySelector('.step').dataset.stage === 'asked'";
-    page.wait("the first step", SOME_TIME, asked)?;
+    page.wait("the first step", asked)?;
     std::thread::sleep(Duration::from_secs(1));
-    page.wait("still the first step", Duration::from_secs(1), asked)?;
+    page.wait("still the first step", asked)?;
     for step in 1..=STEPS {
         let button = format!("document.querySelector('.step:nth-child({step})[data-stage=asked] .begin')");
-        page.wait(&format!("step {step}"), SOME_TIME, &format!("{button} !== null"))?;
+        page.wait(&format!("step {step}"), &format!("{button} !== null"))?;
         let moves = format!("{button}.closest('li').hasAttribute('data-moves')");
         if page.evaluate(&moves)?.as_bool() != Some(step == STEPS) {
             return Err(format!("step {step}: the motor moves in the last one and no other"));
         }
         page.evaluate(&format!("{button}.click()"))?;
     }
-    page.wait("the end", SOME_TIME, "document.getElementById('end').hasAttribute('data-well')")?;
+    page.wait("the end", "document.getElementById('end').hasAttribute('data-well')")?;
     page.photograph(&scratch.join("done.png"))?;
     let lines = page.text("document.getElementById('end').innerText")?;
     if !lines.contains("4000 counts a turn") {
@@ -75,7 +73,7 @@ fn commission() -> Result<(), Error> {
         return Err("the encoder's reading was never shown".into());
     }
     page.click("leave")?;
-    program.ended(SOME_TIME)
+    program.ended()
 }
 
 /// Takes some 20 s: a round is simulated and diagnosed, and its outcome is fed forward.
@@ -97,20 +95,20 @@ fn settle() -> Result<(), Error> {
     let one_round = ["--rounds", "1", "--motion", "40", "--inputs", "characterise"];
     let mut program = Program::start_with(&places.program, &[&settle[..], &one_round].concat())?;
     let mut page = Page::open(&browser, &program.url, 390, 844, true)?;
-    page.wait("the first round", SOME_TIME, ASKED)?;
+    page.wait("the first round", ASKED)?;
     let first = page.text("document.querySelector('.step .text').textContent")?;
     check("the page says what is asked and why", first.contains("round 1") && first.contains("why"), &first)?;
     check("nothing is played before the press", !out.join("round-1").exists(), &out)?;
     page.evaluate("window.said = new Set(); new MutationObserver(() => document.querySelectorAll('.going, .news').forEach((one) => said.add(one.textContent))).observe(document.getElementById('steps'), { subtree: true, childList: true, characterData: true })")?;
     let mut steps = 0;
     loop {
-        page.wait("a step or the end", SOME_TIME, &format!("{ASKED} || {ENDED}"))?;
+        page.wait("a step or the end", &format!("{ASKED} || {ENDED}"))?;
         if page.evaluate(ENDED)?.as_bool() == Some(true) {
             break;
         }
         steps += 1;
         page.evaluate("document.querySelector('.step[data-stage=asked] .begin').click()")?;
-        page.wait("the step begins", SOME_TIME, &format!("!({ASKED}) || {ENDED}"))?;
+        page.wait("the step begins", &format!("!({ASKED}) || {ENDED}"))?;
     }
     page.photograph(&scratch.join("settled.png"))?;
     check("a round and the steps of feeding forward", steps >= 3, steps)?;
@@ -122,7 +120,7 @@ fn settle() -> Result<(), Error> {
     let conclusion = found["conclusion"].as_str().ok_or("a conclusion")?;
     check("the page ends with the conclusion", end.contains(conclusion), (&end, conclusion))?;
     page.click("leave")?;
-    program.ended(SOME_TIME)
+    program.ended()
 }
 
 /// A folder that is not there yet, whatever an earlier run of the test left.
@@ -160,16 +158,16 @@ fn leave_settling(name: &str, while_it_plays: bool) -> Result<(), Error> {
     let settle = [&settle[..], &["--inputs", "characterise", "--no-compensate"]].concat();
     let mut program = Program::start_with(&places.program, &settle)?;
     let mut page = Page::open(&browser, &program.url, 1_440, 900, false)?;
-    page.wait("the first round", SOME_TIME, ASKED)?;
+    page.wait("the first round", ASKED)?;
     if while_it_plays {
         page.evaluate("document.querySelector('.step[data-stage=asked] .begin').click()")?;
-        page.wait("it plays", SOME_TIME, "document.querySelector('.news').textContent.includes('played')")?;
+        page.wait("it plays", "document.querySelector('.news').textContent.includes('played')")?;
     }
     page.click("leave")?;
-    let why = program.ended(SOME_TIME).err().unwrap_or_default();
+    let why = program.ended().err().unwrap_or_default();
     check("a run that was left is no success", why.contains("failed"), why)?;
     check("no recording is kept", !out.join("round-1/fit.csv").exists(), &out)?;
-    page.wait("the page says so", SOME_TIME, "!document.getElementById('banner').hidden")?;
+    page.wait("the page says so", "!document.getElementById('banner').hidden")?;
     let said = page.text("document.getElementById('banner').textContent")?;
     check("and that it can be closed", said.contains("close this page"), said)
 }
@@ -190,8 +188,8 @@ fn change_gains() -> Result<(), Error> {
     let part = part.to_str().ok_or("the target folder has a plain name")?;
     let program = Program::start_with(&places.program, &["run", "--port", "0", "--device-config", part])?;
     let mut page = Page::open(&browser, &program.url, 1_440, 900, false)?;
-    page.wait("the slider", SOME_TIME, "!document.getElementById('own-forces').hidden")?;
-    page.wait("all of it", SOME_TIME, "document.getElementById('own-value').textContent === '100 %'")?;
+    page.wait("the slider", "!document.getElementById('own-forces').hidden")?;
+    page.wait("all of it", "document.getElementById('own-value').textContent === '100 %'")?;
     page.evaluate(
         "{ const s = document.getElementById('own-share'); s.value = 30; s.dispatchEvent(new Event('input')); }",
     )?;

@@ -3,11 +3,8 @@
 //! how it feels, is not tested here.
 
 use serde_json::{Value, json};
-use std::time::Duration;
 use tests::browser::{Chromium, Error, Page, Places, Program, check};
 
-/// A start on a busy machine.
-const SOME_TIME: Duration = Duration::from_secs(60);
 /// A headset that does not move, its eyes 64 mm apart.
 const EMULATE: &str = "{
     window.emulated = new IWER.XRDevice(IWER.metaQuest3, { stereoEnabled: true, ipd: 0.064 });
@@ -48,7 +45,7 @@ fn visit() -> Result<(), Error> {
     let program = Program::start(&places.program, 0, None)?;
     without_one(&mut Page::open(&browser, &format!("{}#body", program.url), 1_440, 900, false)?)?;
     let mut page = Page::open(&browser, &program.url, 1_440, 900, false)?;
-    page.wait("a needle", SOME_TIME, "__stats.depthMm > -100")?;
+    page.wait("a needle", "__stats.depthMm > -100")?;
     let file = places.target.join("node/node_modules/iwer/build/iwer.min.js");
     let emulation = std::fs::read_to_string(&file).map_err(|cause| {
         format!("{} is missing ({cause}): run `cargo xtask test browser`", file.display())
@@ -56,27 +53,23 @@ fn visit() -> Result<(), Error> {
     page.evaluate(&format!("{{ {emulation} }}"))?;
     page.evaluate(EMULATE)?;
     page.click("view-body")?;
-    page.wait("the button", SOME_TIME, &format!("!{BUTTON}.hidden && __body.frames > 5"))?;
+    page.wait("the button", &format!("!{BUTTON}.hidden && __body.frames > 5"))?;
     page.photograph(&scratch.join("button.png"))?;
     page.evaluate(&format!("{BUTTON}.click()"))?;
-    page.wait("pictures in the headset", SOME_TIME, "__body.headset.frames > 5")?;
+    page.wait("pictures in the headset", "__body.headset.frames > 5")?;
     page.evaluate(COUNT_TONES)?;
     both_eyes(&mut page)?;
     page.photograph(&scratch.join("headset.png"))?;
     needle_goes_on(&mut page)?;
     page.evaluate(&format!("{BUTTON}.click()"))?;
-    page.wait(
-        "the page again",
-        SOME_TIME,
-        &format!("!__body.headset.session && {BUTTON}.textContent === 'Headset'"),
-    )?;
+    page.wait("the page again", &format!("!__body.headset.session && {BUTTON}.textContent === 'Headset'"))?;
     page.evaluate("window.before = __body.frames")?;
-    page.wait("the page's own pictures", SOME_TIME, "__body.frames > before + 5")
+    page.wait("the page's own pictures", "__body.frames > before + 5")
 }
 
 /// Tests that nothing is offered if the browser has no headset.
 fn without_one(page: &mut Page) -> Result<(), Error> {
-    page.wait("the limb", SOME_TIME, "__body.frames > 5")?;
+    page.wait("the limb", "__body.frames > 5")?;
     let hidden = page.evaluate(&format!("{BUTTON}.hidden"))?;
     check("no button without a headset", hidden == json!(true), hidden)
 }
@@ -104,12 +97,12 @@ fn both_eyes(page: &mut Page) -> Result<(), Error> {
     // The limb is four times as large as it is: 64 mm between the eyes are 16 of its own.
     let apart = number(&right["eye"][0]) - number(&left["eye"][0]);
     check("the eyes are as far apart as they are", (apart - 16.0).abs() < 0.5, apart)?;
-    page.wait("a picture in each eye", SOME_TIME, "Object.keys(window.tones ?? {}).length === 2")?;
+    page.wait("a picture in each eye", "Object.keys(window.tones ?? {}).length === 2")?;
     let tones = page.evaluate("Object.values(tones)")?;
     let is_drawn = tones.as_array().is_some_and(|all| all.iter().all(|one| number(one) > 50.0));
     check("a limb in each eye", is_drawn, tones)?;
     page.evaluate("emulated.position.x += 0.1, window.before = __body.headset.frames")?;
-    page.wait("a few pictures", SOME_TIME, "__body.headset.frames > before + 3")?;
+    page.wait("a few pictures", "__body.headset.frames > before + 3")?;
     let after = eyes(page)?;
     let moved = number(&after[0]["eye"][0]) - number(&left["eye"][0]);
     check("the head's 100 mm are 25 of the limb's", (moved - 25.0).abs() < 0.5, moved)
@@ -117,9 +110,9 @@ fn both_eyes(page: &mut Page) -> Result<(), Error> {
 
 /// The needle in the headset is the device's, and the tissue goes on with it.
 fn needle_goes_on(page: &mut Page) -> Result<(), Error> {
-    page.wait("the needle outside", SOME_TIME, "__stats.depthMm < 0")?;
+    page.wait("the needle outside", "__stats.depthMm < 0")?;
     // The page's figure is of its last picture, and here pictures are slow.
     let is_the_devices =
         "__stats.depthMm > 6 && Math.abs(__body.headset.step(0.016)[1].depth - __stats.depthMm) < 0.5";
-    page.wait("the device's needle, deep inside", SOME_TIME, is_the_devices)
+    page.wait("the device's needle, deep inside", is_the_devices)
 }

@@ -2,12 +2,8 @@
 //! the report names what the rig lacks.
 
 use std::fmt::Write as _;
-use std::time::Duration;
 use tests::browser::{Chromium, Error, Page, Places, Program, check};
 
-const SOME_TIME: Duration = Duration::from_secs(60);
-/// A diagnosis on a busy machine.
-const LONG: Duration = Duration::from_secs(180);
 /// The machine of the log; its rig knows no viscous friction.
 const INERTIA: f64 = 2e-4;
 const GAIN: f64 = 0.02;
@@ -56,15 +52,11 @@ fn visit() -> Result<(), Error> {
              document.body.dispatchEvent(new DragEvent('drop', {{ dataTransfer: data, bubbles: true }})); }})()"
         )
     };
-    page.wait("a page", SOME_TIME, "document.readyState === 'complete'")?;
+    page.wait("a page", "document.readyState === 'complete'")?;
     page.evaluate(&dropped("photo.bin", "\u{1}\u{2}no table"))?;
-    page.wait(
-        "a refusal in words",
-        SOME_TIME,
-        "document.getElementById('banner').textContent.includes('photo.bin')",
-    )?;
+    page.wait("a refusal in words", "document.getElementById('banner').textContent.includes('photo.bin')")?;
     page.evaluate(&dropped("../log.csv", &log()))?;
-    page.wait("three columns", SOME_TIME, "document.getElementById('columns').rows.length === 3")?;
+    page.wait("three columns", "document.getElementById('columns').rows.length === 3")?;
     let roles =
         page.text("[...document.querySelectorAll('#columns select')].map((one) => one.value).join(' ')")?;
     check("roles by their names", roles == "time command position", roles)?;
@@ -78,21 +70,20 @@ fn visit() -> Result<(), Error> {
     }
     page.photograph(&scratch.join("columns.png"))?;
     page.evaluate("document.getElementById('read').click()")?;
-    page.wait("the rig's values", SOME_TIME, "!document.getElementById('rig').hidden")?;
+    page.wait("the rig's values", "!document.getElementById('rig').hidden")?;
     page.evaluate("document.getElementById('diagnose').click()")?;
     page.wait(
         "a missing value named",
-        SOME_TIME,
         "document.getElementById('banner').textContent.includes('model.inertia is needed')",
     )?;
     for (key, value) in [("model.inertia", INERTIA), ("model.coulomb", COULOMB), ("actuator.gain", GAIN)] {
         page.evaluate(&format!("document.querySelector(\"[data-key='{key}']\").value = '{value}'"))?;
     }
     page.evaluate("document.getElementById('diagnose').click()")?;
-    page.wait("progress", SOME_TIME, "document.getElementById('stage').textContent.includes('%')")?;
-    page.wait("a report", LONG, "!document.getElementById('found').hidden")?;
+    page.wait("progress", "document.getElementById('stage').textContent.includes('%')")?;
+    page.wait("a report", "!document.getElementById('found').hidden")?;
     let said = "document.getElementById('report').contentDocument?.querySelector('h1')?.textContent ?? ''";
-    page.wait("its sentence", SOME_TIME, &format!("({said}) !== ''"))?;
+    page.wait("its sentence", &format!("({said}) !== ''"))?;
     let sentence = page.text(said)?;
     check("what the rig lacks", sentence.contains("friction that grows with speed"), &sentence)?;
     check("the folder has it", scratch.join("imported/report/report.html").is_file(), &out)?;

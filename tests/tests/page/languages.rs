@@ -1,7 +1,7 @@
 //! The page in German and French: one file of texts for each language, chosen by the browser's
 //! languages or by the person, with room for the longer words.
 
-use crate::needle::{LIVE, SIZES, SOON, Size, complaints, open, resize};
+use crate::needle::{LIVE, SIZES, Size, complaints, open, resize};
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -119,7 +119,7 @@ fn visit() -> Result<(), Error> {
     page.evaluate(
         "(() => { const s = document.getElementById('language'); s.value = 'de'; s.dispatchEvent(new Event('change')); })()",
     )?;
-    page.wait("the chosen language", SOON, &format!("{LIVE} && document.documentElement.lang === 'de'"))?;
+    page.wait("the chosen language", &format!("{LIVE} && document.documentElement.lang === 'de'"))?;
     numbers_and_sentences(&mut page)?;
     complaints(&mut page)
 }
@@ -128,7 +128,7 @@ fn visit() -> Result<(), Error> {
 fn speaks(page: &mut Page, tags: &str, language: &str, stop: &str) -> Result<(), Error> {
     page.languages(tags)?;
     page.evaluate("window.__old = true, location.reload()")?;
-    page.wait("the page anew", SOON, &format!("!window.__old && {LIVE}"))?;
+    page.wait("the page anew", &format!("!window.__old && {LIVE}"))?;
     let found = page.evaluate(
         "[document.documentElement.lang, document.getElementById('language').value, document.getElementById('stop').firstChild.data]",
     )?;
@@ -179,16 +179,11 @@ const TOO_WIDE: &str = "(() => {
 
 /// A decimal comma, and sentences of the program, in German.
 fn numbers_and_sentences(page: &mut Page) -> Result<(), Error> {
-    page.wait(
-        "a decimal comma",
-        SOON,
-        "/^−?\\d+,\\d\\d$/.test(document.getElementById('depth').textContent)",
-    )?;
+    page.wait("a decimal comma", "/^−?\\d+,\\d\\d$/.test(document.getElementById('depth').textContent)")?;
     let goal = page.text("document.getElementById('goal').textContent")?;
     check("the goal in German", goal == "Blut aus der Vene entnehmen.", goal)?;
     page.wait(
         "a puncture in German",
-        SOON,
         "[...document.querySelectorAll('#events [data-kind=puncture] span')].some(e => /^Haut durchstochen bei \\d,\\d\\smm; \\d,\\d\\d\\sN$/.test(e.textContent))",
     )
 }

@@ -1,7 +1,7 @@
 //! The layout on a desktop: nothing scrolls that could be seen at once, and the list of attempts
 //! has room.
 
-use crate::needle::{SOON, complaints, open, pictures, resize};
+use crate::needle::{complaints, open, pictures, resize};
 use std::time::Duration;
 use tests::browser::{Chromium, Error, Page, Places, Program, check};
 
@@ -31,7 +31,7 @@ fn visit() -> Result<(), Error> {
     // A person's note is longer than the demo's.
     page.evaluate("document.getElementById('section').focus()")?;
     page.press("ArrowRight", "ArrowRight", 39)?;
-    page.wait("the needle in a person's hand", SOON, "!document.getElementById('demo').disabled")?;
+    page.wait("the needle in a person's hand", "!document.getElementById('demo').disabled")?;
     for size in [(1280, 720, false), (1440, 900, false)] {
         resize(&mut page, size)?;
         fits(&mut page, size.0)?;

@@ -4,7 +4,6 @@
 
 use serde_json::{Value, json};
 use std::path::Path;
-use std::time::Duration;
 use tests::browser::{Chromium, Error, Page, Places, Program, check};
 
 /// A size of the page: width and height in CSS pixels, and true if a finger drags instead of a
@@ -13,10 +12,6 @@ pub(crate) type Size = (u32, u32, bool);
 /// Desktop, laptop, phone and a 4K screen.
 pub(crate) const SIZES: [Size; 4] =
     [(1_440, 900, false), (1_280, 720, false), (390, 844, true), (3_840, 2_160, false)];
-/// A slow machine may take so long to answer.
-pub(crate) const SOON: Duration = Duration::from_secs(30);
-/// The scripted venepuncture takes 6 s; a busy machine may be slow to begin.
-pub(crate) const A_FEW_INSERTIONS: Duration = Duration::from_secs(60);
 /// Condition that the page shows live data.
 pub(crate) const LIVE: &str = "document.body.dataset.link === 'live' && !isNaN(__stats.firstFrameMs)";
 /// Stiffness of the hand's grip, in N/mm (`host-sim/procedures/venepuncture.toml`): a force bends
@@ -73,7 +68,7 @@ fn layers_are_at_their_depths_at_any_angle() {
 /// Opens the page and waits for live data.
 pub(crate) fn open(browser: &Chromium, url: &str, (width, height, phone): Size) -> Result<Page, Error> {
     let mut page = Page::open(browser, url, width, height, phone)?;
-    page.wait("live data", SOON, LIVE)?;
+    page.wait("live data", LIVE)?;
     Ok(page)
 }
 
@@ -81,14 +76,14 @@ pub(crate) fn open(browser: &Chromium, url: &str, (width, height, phone): Size) 
 pub(crate) fn resize(page: &mut Page, (width, height, phone): Size) -> Result<(), Error> {
     page.resize(width, height, phone)?;
     let resized = format!("innerWidth === {width} && innerHeight === {height}");
-    page.wait("the new size", SOON, &resized)?;
+    page.wait("the new size", &resized)?;
     pictures(page, 3)
 }
 
 /// Waits for `count` more pictures.
 pub(crate) fn pictures(page: &mut Page, count: u32) -> Result<(), Error> {
     page.evaluate("window.__seen = __stats.frames")?;
-    page.wait("pictures", SOON, &format!("__stats.frames >= __seen + {count}"))
+    page.wait("pictures", &format!("__stats.frames >= __seen + {count}"))
 }
 
 /// Fails if the console has errors.
@@ -129,7 +124,7 @@ impl Grab {
             page.mouse("mousePressed", at)?
         }
         let held = "document.getElementById('section').dataset.held === 'true'";
-        page.wait("the needle taken", SOON, held)?;
+        page.wait("the needle taken", held)?;
         pictures(page, 2)?;
         let seen = page.evaluate("[__stats.drawn.scale, __stats.drawn.angle, __stats.handMm]")?;
         let part = |i: usize| seen[i].as_f64().ok_or("the page has no hand");
@@ -166,7 +161,7 @@ pub(crate) const OUTSIDE_MM: f64 = -5.0;
 /// Drags the needle in single millimetres to each of `depths`, which lie behind the far wall,
 /// beyond its hub, and out again.
 fn follow(page: &mut Page, size: Size, depths: &[f64], hub_at: Option<f64>) -> Result<(), Error> {
-    page.wait("the needle outside", A_FEW_INSERTIONS, "__stats.depthMm < -4")?;
+    page.wait("the needle outside", "__stats.depthMm < -4")?;
     let grab = Grab::take(page, size.2)?;
     let mut wanted = grab.begin_mm.ceil();
     for depth in depths {
@@ -188,7 +183,7 @@ fn follow(page: &mut Page, size: Size, depths: &[f64], hub_at: Option<f64>) -> R
     check("the scale of the grab to its end", frozen == grab.scale, (size, grab.scale, frozen))?;
     // Not to where it was taken: the script may have gone on a little before.
     grab.move_to(page, OUTSIDE_MM)?;
-    page.wait("the needle outside", SOON, "__stats.depthMm < -4")?;
+    page.wait("the needle outside", "__stats.depthMm < -4")?;
     grab.let_go(page, OUTSIDE_MM)
 }
 
@@ -199,7 +194,7 @@ fn needle_is_at(page: &mut Page, depth: f64, size: Size, grab: &Grab) -> Result<
     let hand = format!("Math.abs(__stats.handMm - {depth}) <= {allowed}");
     let tip = format!("__stats.depthMm + __stats.motorN / {GRIP_N_PER_MM}");
     let needle = format!("Math.abs({tip} - __stats.handMm) <= {TRUE_WITHIN} * __stats.handMm");
-    let came = page.wait(&format!("hand and needle at {depth} mm"), SOON, &format!("{hand} && {needle}"));
+    let came = page.wait(&format!("hand and needle at {depth} mm"), &format!("{hand} && {needle}"));
     let seen = page.evaluate(&format!("[__stats.handMm, __stats.depthMm, {tip}]"))?;
     came.map_err(|error| format!("{size:?}: hand, needle, unbent: {seen}; {error}"))
 }
@@ -237,7 +232,7 @@ fn turn() -> Result<(), Error> {
         let turned = format!("Math.abs(__stats.drawn.angle - {}) < 0.004", degrees.to_radians());
         for (when, place) in [("outside", "__stats.depthMm < -4"), ("deep", "__stats.depthMm > 9")] {
             let what = format!("the needle {when} at {degrees}°");
-            page.wait(&what, A_FEW_INSERTIONS, &format!("{turned} && {place}"))?;
+            page.wait(&what, &format!("{turned} && {place}"))?;
             in_sight(&mut page, SIZES[0], when)?;
         }
         page.photograph(&scratch.join(format!("turned-{degrees}.png")))?;

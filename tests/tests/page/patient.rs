@@ -8,9 +8,6 @@ use std::time::Duration;
 use tests::browser::{Chromium, Error, Page, Places, Program, check};
 
 const DESKTOP: (u32, u32) = (1440, 900);
-const SOON: Duration = Duration::from_secs(10);
-/// The scripted venepuncture takes 6 s; a busy machine may be slow to begin.
-const A_FEW_INSERTIONS: Duration = Duration::from_secs(40);
 /// Firm skin gives way at 1.5 N, the adult's at 1 N. Read from the list, which begins anew with
 /// each patient: the force itself is there for a few ms, and a browser without a graphics processor
 /// may not draw them.
@@ -30,7 +27,7 @@ fn edit_and_scrub() -> Result<(), Error> {
     let browser = Chromium::start(&scratch)?;
     let program = Program::start(&places.program, 0, None)?;
     let mut page = Page::open(&browser, &program.url, DESKTOP.0, DESKTOP.1, false)?;
-    page.wait("live data", SOON, "document.body.dataset.link === 'live' && !isNaN(__stats.firstFrameMs)")?;
+    page.wait("live data", "document.body.dataset.link === 'live' && !isNaN(__stats.firstFrameMs)")?;
     patients(&mut page, &scratch)?;
     drop(page);
     drop(program);
@@ -43,7 +40,7 @@ fn edit_and_scrub() -> Result<(), Error> {
 /// why.
 fn patients(page: &mut Page, scratch: &Path) -> Result<(), Error> {
     page.click("patient")?;
-    page.wait("the editor", SOON, "document.getElementById('patient-editor').open")?;
+    page.wait("the editor", "document.getElementById('patient-editor').open")?;
     let taken = "document.getElementById('patient-answer').textContent === 'The device has taken it.'";
     let is =
         |name: &str| format!("document.getElementById('subtitle').textContent.includes('Profile {name} ')");
@@ -54,8 +51,8 @@ fn patients(page: &mut Page, scratch: &Path) -> Result<(), Error> {
         )
     };
     page.evaluate(&choose("firm-skin"))?;
-    page.wait("firm skin taken", SOON, &format!("{taken} && {}", is("firm-skin")))?;
-    page.wait("the demo in firm skin", A_FEW_INSERTIONS, FIRM_SKIN_PUNCTURED)?;
+    page.wait("firm skin taken", &format!("{taken} && {}", is("firm-skin")))?;
+    page.wait("the demo in firm skin", FIRM_SKIN_PUNCTURED)?;
     let edit = |value: &str| {
         format!(
             "(() => {{ const input = document.querySelector('#patient-fields [data-key=friction_n_per_mm]'); \
@@ -66,17 +63,16 @@ fn patients(page: &mut Page, scratch: &Path) -> Result<(), Error> {
     page.evaluate(&edit("-5"))?;
     page.wait(
         "a refusal at the figure, in its words",
-        SOON,
         "document.getElementById('patient-answer').dataset.tone === 'bad' && \
          document.querySelector('#patient-fields [data-key=friction_n_per_mm][aria-invalid]')?.parentElement.nextSibling.textContent \
          .startsWith('Friction: −5\\u00a0N/mm is out of range; choose 0 to ')",
     )?;
     page.photograph(&scratch.join("patient.png"))?;
     page.evaluate(&edit("0.03"))?;
-    page.wait("an edited patient taken", SOON, taken)?;
-    page.wait("the demo in it", A_FEW_INSERTIONS, FIRM_SKIN_PUNCTURED)?;
+    page.wait("an edited patient taken", taken)?;
+    page.wait("the demo in it", FIRM_SKIN_PUNCTURED)?;
     page.evaluate(&choose("adult"))?;
-    page.wait("the adult again", SOON, &format!("{taken} && {}", is("adult")))?;
+    page.wait("the adult again", &format!("{taken} && {}", is("adult")))?;
     page.click("patient-close")
 }
 
@@ -95,13 +91,9 @@ fn scrub(browser: &Chromium, path: &Path, recording: &Path) -> Result<(), Error>
     let file = recording.to_str().ok_or("the target folder has a plain name")?;
     let program = Program::start_with(path, &["replay", file, "--port", "0"])?;
     let mut page = Page::open(browser, &program.url, DESKTOP.0, DESKTOP.1, false)?;
-    page.wait(
-        "the slider",
-        SOON,
-        "!document.getElementById('scrub').hidden && !isNaN(__stats.firstFrameMs)",
-    )?;
+    page.wait("the slider", "!document.getElementById('scrub').hidden && !isNaN(__stats.firstFrameMs)")?;
     page.click("stop")?;
-    page.wait("a pause", SOON, "document.getElementById('state').textContent === 'Recording paused'")?;
+    page.wait("a pause", "document.getElementById('state').textContent === 'Recording paused'")?;
     // Into the first insertion's hold, before it, and into it again.
     let punctures = "document.querySelectorAll('#events [data-kind=puncture]').length";
     for (at_s, place, given) in
@@ -111,7 +103,7 @@ fn scrub(browser: &Chromium, path: &Path, recording: &Path) -> Result<(), Error>
             "(() => {{ const place = document.getElementById('scrub-place'); place.value = '{at_s}'; \
              place.dispatchEvent(new Event('input')); }})()"
         ))?;
-        page.wait(&format!("the needle at {at_s} s"), SOON, &format!("{place} && {punctures} === {given}"))?;
+        page.wait(&format!("the needle at {at_s} s"), &format!("{place} && {punctures} === {given}"))?;
     }
     only_what_a_recording_has(&mut page)?;
     let paused = page.number("__stats.depthMm")?;
@@ -119,7 +111,7 @@ fn scrub(browser: &Chromium, path: &Path, recording: &Path) -> Result<(), Error>
     let still = page.number("__stats.depthMm")?;
     check("a pause that stands still", paused == still, (paused, still))?;
     page.click("start")?;
-    page.wait("the recording to go on", SOON, "__stats.depthMm < 0")?;
+    page.wait("the recording to go on", "__stats.depthMm < 0")?;
     let complaints = page.complaints()?;
     check("no errors in the console", complaints.is_empty(), &complaints)
 }
@@ -134,7 +126,7 @@ fn only_what_a_recording_has(page: &mut Page) -> Result<(), Error> {
     check("no dead controls", shown == expected, &shown)?;
     let says = page.text("[...['start', 'stop'].map(id => document.getElementById(id).firstChild.data), document.getElementById('hand-note').textContent].join()")?;
     check("words of a recording", says == "Play,Pause,Recording", &says)?;
-    page.wait("the computed force", SOON, COMPUTED_IS_DRAWN)
+    page.wait("the computed force", COMPUTED_IS_DRAWN)
 }
 
 /// Some pixels of the plot against time have the colour of the computed force.

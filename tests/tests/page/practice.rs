@@ -1,7 +1,7 @@
 //! Practice in the page: a goal, a verdict after each withdrawal, the attempts compared with the
 //! best one, the learning curve, and recordings that never replace one another.
 
-use crate::needle::{A_FEW_INSERTIONS, Grab, OUTSIDE_MM, SIZES, SOON, complaints, open};
+use crate::needle::{Grab, OUTSIDE_MM, SIZES, complaints, open};
 use std::path::Path;
 use std::process::Command;
 use std::time::Duration;
@@ -36,7 +36,6 @@ fn visit() -> Result<(), Error> {
     page.click("view-practice")?;
     page.wait(
         "the goal",
-        SOON,
         "document.getElementById('goal').textContent.includes('Draw blood from the vein')",
     )?;
     let steps = page.text("document.getElementById('steps').innerText")?;
@@ -47,17 +46,16 @@ fn visit() -> Result<(), Error> {
     )?;
     page.wait(
         "the scripted hand's attempt",
-        A_FEW_INSERTIONS,
         &format!("{ROWS}.length > 0 && {ROWS}[0].textContent.includes('demo') && {ROWS}[0].textContent.includes('reached')"),
     )?;
-    page.wait("the needle outside", A_FEW_INSERTIONS, "__stats.depthMm < -3")?;
+    page.wait("the needle outside", "__stats.depthMm < -3")?;
     // The scripted hand may have put the tourniquet on for its next insertion, which is this one;
     // it does nothing from now on.
     insert(&mut page, IN_VEIN_MM)?;
-    page.wait("a verdict", SOON, &format!("{VERDICT} !== ''"))?;
+    page.wait("a verdict", &format!("{VERDICT} !== ''"))?;
     record(&mut page, "monday")?;
     tasks_count(&mut page)?;
-    page.wait("a success", SOON, &format!("/^Attempt \\d+\\. Goal reached\\./.test({VERDICT})"))?;
+    page.wait("a success", &format!("/^Attempt \\d+\\. Goal reached\\./.test({VERDICT})"))?;
     check(
         "the best attempt is the person's",
         page.evaluate(&format!("{ROWS}[0].dataset.best"))? == "true",
@@ -65,7 +63,7 @@ fn visit() -> Result<(), Error> {
     )?;
     page.evaluate("window.ghosts = 0, setInterval(() => { if (isFinite(__stats.ghostMm)) ghosts++; }, 20)")?;
     insert(&mut page, THROUGH_MM)?;
-    page.wait("a miss", SOON, &format!("{VERDICT}.includes('it went through the far wall')"))?;
+    page.wait("a miss", &format!("{VERDICT}.includes('it went through the far wall')"))?;
     check("the best one was shown meanwhile", page.number("ghosts")? > 10.0, "no outline")?;
     check(
         "figures are compared with it",
@@ -76,11 +74,7 @@ fn visit() -> Result<(), Error> {
     end_recording(&mut page)?;
     debriefed(&mut page)?;
     record(&mut page, "monday")?;
-    page.wait(
-        "a second file",
-        SOON,
-        "document.getElementById('recording').textContent.includes('monday-2.mcap')",
-    )?;
+    page.wait("a second file", "document.getElementById('recording').textContent.includes('monday-2.mcap')")?;
     end_recording(&mut page)?;
     both_can_be_read(&places.program, &scratch)?;
     pass_mark(&mut page)?;
@@ -92,12 +86,11 @@ fn tasks_count(page: &mut Page) -> Result<(), Error> {
     insert(page, IN_VEIN_MM)?;
     page.wait(
         "a tourniquet left on is a reason",
-        SOON,
         &format!("{VERDICT}.includes('Not reached: the tourniquet was not put on first; the tourniquet was left on.')"),
     )?;
     task(page, "tourniquet_on")?;
     let next = "document.querySelector('#steps [data-next=true]').textContent.includes('Enter the vein')";
-    page.wait("the next step is shown", SOON, next)?;
+    page.wait("the next step is shown", next)?;
     insert_and(page, IN_VEIN_MM, &["tourniquet_off"])
 }
 
@@ -106,21 +99,20 @@ fn record(page: &mut Page, name: &str) -> Result<(), Error> {
     page.click("record")?;
     page.wait(
         "a recording",
-        SOON,
         &format!("document.getElementById('recording').textContent.includes('Recording {name}')"),
     )
 }
 
 fn end_recording(page: &mut Page) -> Result<(), Error> {
     page.click("record")?;
-    page.wait("no recording", SOON, "document.getElementById('recording').textContent === 'Not recording'")
+    page.wait("no recording", "document.getElementById('recording').textContent === 'Not recording'")
 }
 
 /// Presses the button of a task, and waits until the program has reported it.
 fn task(page: &mut Page, name: &str) -> Result<(), Error> {
     let button = format!("document.querySelector('#tasks [data-task={name}]')");
     page.evaluate(&format!("{button}.click()"))?;
-    page.wait("the task is done", SOON, &format!("{button}.dataset.state === 'done'"))
+    page.wait("the task is done", &format!("{button}.dataset.state === 'done'"))
 }
 
 /// Takes the needle by its hub, inserts it to `deepest_mm`, rests and draws it out.
@@ -137,20 +129,20 @@ fn insert_and(page: &mut Page, deepest_mm: f64, tasks: &[&str]) -> Result<(), Er
     for mm in &way {
         grab.move_to(page, *mm)?;
     }
-    page.wait("the needle deep", SOON, &format!("__stats.depthMm > {deepest_mm} - 1"))?;
+    page.wait("the needle deep", &format!("__stats.depthMm > {deepest_mm} - 1"))?;
     std::thread::sleep(REST);
     tasks.iter().try_for_each(|name| task(page, name))?;
     for mm in way.iter().rev() {
         grab.move_to(page, *mm)?;
     }
     grab.move_to(page, OUTSIDE_MM)?;
-    page.wait("the needle outside", SOON, "__stats.depthMm < -3")?;
+    page.wait("the needle outside", "__stats.depthMm < -3")?;
     grab.let_go(page, OUTSIDE_MM)
 }
 
 /// The link appears when a recording has ended, and leads to the debrief of its insertions.
 fn debriefed(page: &mut Page) -> Result<(), Error> {
-    page.wait("the link to the debrief", SOON, "!document.getElementById('debrief').hidden")?;
+    page.wait("the link to the debrief", "!document.getElementById('debrief').hidden")?;
     let html = page.text("fetch(document.getElementById('debrief').href).then(answer => answer.text())")?;
     let is_whole = html.contains("<h1>Debrief</h1>") && html.contains("monday.mcap, insertion 3");
     check("the debrief of the insertions", is_whole, html.chars().take(300).collect::<String>())

@@ -5,7 +5,6 @@
 use std::fmt::Write as _;
 use std::process::Command;
 
-use crate::needle::SOON;
 use tests::browser::{Chromium, Error, Page, Places, check};
 
 /// The recorded position, rad, over the time, s.
@@ -52,7 +51,7 @@ fn visit() -> Result<(), Error> {
     let browser = Chromium::start(&scratch)?;
     let url = format!("file://{}", scratch.join("simulation.html").display());
     let mut page = Page::open(&browser, &url, 1_440, 900, false)?;
-    page.wait("a plot", SOON, "document.querySelector('svg[data-x] + output') !== null")?;
+    page.wait("a plot", "document.querySelector('svg[data-x] + output') !== null")?;
     check("the readout of the whole", reads(&mut page, 0.5)?, said(&mut page)?)?;
     let whole = labels(&mut page)?;
     let (from, to) = (place(&mut page, 0.4)?, place(&mut page, 0.5)?);

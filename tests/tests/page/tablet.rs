@@ -1,7 +1,7 @@
 //! Practice on tablets and phones: with fifty attempts in the list nothing covers what a finger is
 //! to touch, and the picture is seen together with the buttons of the tasks.
 
-use crate::needle::{LIVE, SOON, Size, complaints, open, resize};
+use crate::needle::{LIVE, Size, complaints, open, resize};
 use tests::browser::{Chromium, Error, Page, Places, Program, check};
 
 const SIZES: [Size; 6] = [
@@ -36,8 +36,8 @@ fn visit() -> Result<(), Error> {
     let mut page = open(&browser, &program.url, SIZES[0])?;
     page.before_load(KEEP_SOCKET)?;
     page.evaluate("location.reload()")?;
-    page.wait("the page again", SOON, &format!("Boolean(window.socket) && {LIVE}"))?;
-    page.wait("tasks", SOON, "document.querySelectorAll('#tasks button').length > 0")?;
+    page.wait("the page again", &format!("Boolean(window.socket) && {LIVE}"))?;
+    page.wait("tasks", "document.querySelectorAll('#tasks button').length > 0")?;
     page.evaluate("document.getElementById('view-practice').click()")?;
     page.evaluate(FIFTY_ATTEMPTS)?;
     for size in SIZES {
@@ -86,7 +86,6 @@ fn tap_records(page: &mut Page) -> Result<(), Error> {
     page.touch("touchEnd", at)?;
     page.wait(
         "a recording",
-        SOON,
         "document.getElementById('recording').textContent.includes('Recording practice')",
     )
 }

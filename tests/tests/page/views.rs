@@ -7,8 +7,6 @@ use std::process::Command;
 use std::time::Duration;
 use tests::browser::{Chromium, Error, Page, Places, Program};
 
-/// A start on a busy machine; a scripted insertion takes 6 s.
-const SOME_TIME: Duration = Duration::from_secs(60);
 const DRAWN: &str = "__body.frames > 5 && document.getElementById('body-note').textContent === ''";
 const IN_PLANE: &str = "__body.share > 0.5";
 
@@ -56,16 +54,16 @@ fn site(target: &Path) -> Result<String, Error> {
 /// probe is moved away.
 fn look(browser: &Chromium, url: &str, photograph: &Path) -> Result<(), Error> {
     let mut page = Page::open(browser, url, 1_440, 900, false)?;
-    page.wait("a needle", SOME_TIME, "__stats.depthMm > -100")?;
+    page.wait("a needle", "__stats.depthMm > -100")?;
     page.click("view-body")?;
-    page.wait("limb and ultrasound", SOME_TIME, DRAWN)?;
-    page.wait("the needle in the image", SOME_TIME, IN_PLANE)?;
+    page.wait("limb and ultrasound", DRAWN)?;
+    page.wait("the needle in the image", IN_PLANE)?;
     page.photograph(photograph)?;
-    page.wait("the needle outside", SOME_TIME, "__stats.depthMm < 0")?;
+    page.wait("the needle outside", "__stats.depthMm < 0")?;
     page.evaluate(
         "{ const s = document.getElementById('probe-across'); s.value = 6; s.dispatchEvent(new Event('input')); }",
     )?;
-    page.wait("the needle inside again", SOME_TIME, "__stats.depthMm > 6")?;
+    page.wait("the needle inside again", "__stats.depthMm > 6")?;
     std::thread::sleep(Duration::from_millis(500));
     let share = page.number("__body.share")?;
     if share > 0.01 {
@@ -73,7 +71,7 @@ fn look(browser: &Chromium, url: &str, photograph: &Path) -> Result<(), Error> {
     }
     table_1(&mut page)?;
     page.click("view-section")?;
-    page.wait("the section", SOME_TIME, "document.getElementById('section').clientHeight > 100")
+    page.wait("the section", "document.getElementById('section').clientHeight > 100")
 }
 
 /// Table 1 of Paper 000 replaces the limb, is drawn and imaged, and gives way to the limb again.
@@ -83,12 +81,12 @@ fn table_1(page: &mut Page) -> Result<(), Error> {
             "{{ const s = document.getElementById('tissue-model'); s.value = '{value}'; s.dispatchEvent(new Event('change')); }}"
         ))?;
         page.evaluate("__body.frames = 0")?;
-        page.wait("a picture", SOME_TIME, DRAWN)?;
+        page.wait("a picture", DRAWN)?;
         page.number("__body.particles")
     };
     let limb = page.number("__body.particles")?;
     let table = choose(page, "table-1")?;
-    page.wait("the needle deep in Table 1", SOME_TIME, "__stats.depthMm > 6 && __body.frames > 20")?;
+    page.wait("the needle deep in Table 1", "__stats.depthMm > 6 && __body.frames > 20")?;
     let note = page.text("document.getElementById('body-note').textContent")?;
     let again = choose(page, "limb")?;
     if table > 10.0 && table != limb && again == limb && note.is_empty() {

@@ -1,6 +1,5 @@
 //! Stop, Start, Demo, zero and the angle, as a person uses them.
 
-use super::{A_FEW_INSERTIONS, SOON};
 use std::path::Path;
 use std::time::Duration;
 use tests::browser::{Error, Page, check};
@@ -17,33 +16,25 @@ pub(super) fn stop(page: &mut Page) -> Result<(), Error> {
         "document.getElementById('state').textContent === 'Stopped, torque off' && __stats.motorN === 0";
     let running = "document.getElementById('state').textContent.startsWith('Running')";
     page.click("stop")?;
-    page.wait("a stop by the button", SOON, stopped)?;
+    page.wait("a stop by the button", stopped)?;
     for (key, code, number) in [("Escape", "Escape", 27), (" ", "Space", 32)] {
         page.click("start")?;
-        page.wait("a start", SOON, running)?;
+        page.wait("a start", running)?;
         page.press(key, code, number)?;
-        page.wait(&format!("a stop by the key {code}"), SOON, stopped)?;
+        page.wait(&format!("a stop by the key {code}"), stopped)?;
     }
-    page.wait(
-        "the stop in the list",
-        SOON,
-        "document.querySelector('#events [data-kind=stopped]') !== null",
-    )?;
+    page.wait("the stop in the list", "document.querySelector('#events [data-kind=stopped]') !== null")?;
     page.click("start")?;
-    page.wait("a start", SOON, running)?;
+    page.wait("a start", running)?;
     page.click("demo")?;
-    page.wait("the demo", SOON, "document.getElementById('hand-note').textContent.startsWith('Demo')")?;
-    page.wait("the scripted hand", A_FEW_INSERTIONS, "__stats.depthMm > 6")?;
+    page.wait("the demo", "document.getElementById('hand-note').textContent.startsWith('Demo')")?;
+    page.wait("the scripted hand", "__stats.depthMm > 6")?;
     // Arrow keys take the needle from the script, too, and hold it.
     page.evaluate("document.getElementById('section').focus()")?;
     for _ in 0..5 {
         page.press("ArrowLeft", "ArrowLeft", 37)?;
     }
-    page.wait(
-        "the needle taken",
-        SOON,
-        "document.getElementById('hand-note').textContent.startsWith('You hold')",
-    )?;
+    page.wait("the needle taken", "document.getElementById('hand-note').textContent.startsWith('You hold')")?;
     std::thread::sleep(Duration::from_millis(2_500));
     let held = page.number("__stats.depthMm")?;
     let wanted = page.number("Number(document.getElementById('section').getAttribute('aria-valuenow'))")?;
@@ -55,19 +46,19 @@ pub(super) fn stop(page: &mut Page) -> Result<(), Error> {
 /// simulated needle.
 pub(super) fn zero_and_turn(page: &mut Page) -> Result<(), Error> {
     let locked = "document.getElementById('zero').disabled";
-    page.wait("no zero while torque is on", SOON, locked)?;
+    page.wait("no zero while torque is on", locked)?;
     page.click("stop")?;
-    page.wait("a zero to be had", SOON, &format!("!{locked}"))?;
-    page.wait("the needle at rest, not at 0", SOON, &format!("__stats.depthMm < -3 && {AT_REST}"))?;
+    page.wait("a zero to be had", &format!("!{locked}"))?;
+    page.wait("the needle at rest, not at 0", &format!("__stats.depthMm < -3 && {AT_REST}"))?;
     page.click("zero")?;
-    page.wait("the tip at depth 0", SOON, "Math.abs(__stats.depthMm) < 0.3")?;
+    page.wait("the tip at depth 0", "Math.abs(__stats.depthMm) < 0.3")?;
     page.evaluate("document.getElementById('angle').focus()")?;
     for _ in 0..3 {
         page.press("ArrowRight", "ArrowRight", 39)?;
     }
-    page.wait("the needle turned", SOON, "document.getElementById('tilt').textContent === '33'")?;
+    page.wait("the needle turned", "document.getElementById('tilt').textContent === '33'")?;
     page.click("start")?;
-    page.wait("both walls from the new zero", A_FEW_INSERTIONS, "__stats.depthMm > 6")
+    page.wait("both walls from the new zero", "__stats.depthMm > 6")
 }
 
 /// The needle turns; steeper, the same way along the needle goes through the far wall, and is
@@ -83,17 +74,16 @@ pub(super) fn turn_and_go_through(page: &mut Page, scratch: &Path) -> Result<(),
         format!("__stats.depthMm < -3 && Math.abs(__stats.drawn.angle - {}) < 0.004", degrees.to_radians())
     };
     page.evaluate(&turn(30))?;
-    page.wait("the needle outside at 30°", A_FEW_INSERTIONS, &drawn(30.0))?;
+    page.wait("the needle outside at 30°", &drawn(30.0))?;
     page.evaluate(&turn(60))?;
-    page.wait("the needle outside at 60°", A_FEW_INSERTIONS, &drawn(60.0))?;
-    page.wait("blood in the hub", A_FEW_INSERTIONS, "__stats.vessel === 'in_lumen' && __stats.flashback")?;
-    page.wait("a needle through the far wall", A_FEW_INSERTIONS, "__stats.vessel === 'through'")?;
+    page.wait("the needle outside at 60°", &drawn(60.0))?;
+    page.wait("blood in the hub", "__stats.vessel === 'in_lumen' && __stats.flashback")?;
+    page.wait("a needle through the far wall", "__stats.vessel === 'through'")?;
     page.photograph(&scratch.join("through.png"))?;
     page.wait(
         "a through-puncture reported as one",
-        SOON,
         "document.querySelector('#events [data-kind=far_wall]')?.textContent.includes('far wall')",
     )?;
     page.evaluate(&turn(30))?;
-    page.wait("the needle outside at 30°", A_FEW_INSERTIONS, &drawn(30.0))
+    page.wait("the needle outside at 30°", &drawn(30.0))
 }

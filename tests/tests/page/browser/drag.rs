@@ -1,6 +1,6 @@
 //! The needle in a person's hand: the skin pushes back as the control core computes it.
 
-use super::{A_FEW_INSERTIONS, SOON, TILT_RAD};
+use super::TILT_RAD;
 use control_core::config::Config;
 use control_core::controller::{Controller, Order, TickInput};
 use control_core::units::{Counts, Milliradians};
@@ -13,14 +13,10 @@ const FORCE_TOLERANCE_N: f64 = 0.03;
 /// A person takes the needle with the mouse and presses the skin: the force answers as the control
 /// core computes it.
 pub(super) fn drag(page: &mut Page) -> Result<(), Error> {
-    page.wait("the needle outside", A_FEW_INSERTIONS, "__stats.depthMm < -3")?;
+    page.wait("the needle outside", "__stats.depthMm < -3")?;
     let mut at = page.middle("section")?;
     page.mouse("mousePressed", at)?;
-    page.wait(
-        "the needle taken",
-        SOON,
-        "document.getElementById('hand-note').textContent.startsWith('You hold')",
-    )?;
+    page.wait("the needle taken", "document.getElementById('hand-note').textContent.startsWith('You hold')")?;
     push_until(page, &mut at, 1.9)?;
     // The hand holds still: needle and force settle.
     std::thread::sleep(Duration::from_millis(600));

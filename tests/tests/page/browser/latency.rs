@@ -1,6 +1,6 @@
 //! The time from a person's hand to the picture of the force that answers it.
 
-use super::{SOON, TILT_RAD, row};
+use super::{TILT_RAD, row};
 use serde_json::Value;
 use std::time::Duration;
 use tests::browser::{Error, Page};
@@ -43,10 +43,10 @@ pub(super) fn latency(page: &mut Page) -> Result<Vec<Value>, Error> {
     let is_bench = std::env::var_os(tests::BENCH).is_some();
     for step in 0..if is_bench { LATENCY_STEPS_OF_A_BENCH } else { LATENCY_STEPS } {
         // Not in step with the screen.
-        page.wait("the needle drawn back", SOON, "__stats.depthMm < 0.9")?;
+        page.wait("the needle drawn back", "__stats.depthMm < 0.9")?;
         std::thread::sleep(Duration::from_millis(150 + (step as u64 * 7) % 17));
         page.mouse("mouseMoved", deep)?;
-        page.wait("the force to answer", SOON, &format!("__latency.times.length > {step}"))?;
+        page.wait("the force to answer", &format!("__latency.times.length > {step}"))?;
         std::thread::sleep(Duration::from_millis(30));
         page.mouse("mouseMoved", near)?;
     }
