@@ -56,7 +56,7 @@ export class Section {
     tissue.vein.drawBlood(g, this);
     this.vessel(g, tissue, width);
     this.beside(g, tissue);
-    if (!this.small) this.ruler(g, tissue);
+    if (!this.small) this.ruler(g, tissue, width, height);
     this.needle(g, view, tissue);
     this.angle(g, view);
     this.names(g, tissue, width, height);
@@ -263,7 +263,7 @@ export class Section {
   }
 
   /** Depth along the needle, where it will go: a tick each mm, a number each five. */
-  ruler(g, tissue) {
+  ruler(g, tissue, width, height) {
     const far = tissue.vessel?.far_mm ?? tissue.layers.at(-1)?.depth_mm ?? 5;
     const reach = Math.min(Math.ceil(far / Math.max(this.axis.y, 0.1) + 3), tissue.needle.length_mm);
     g.save();
@@ -289,7 +289,11 @@ export class Section {
     g.textBaseline = "top";
     // Where five millimetres are narrower than their label, every second one has it.
     const labelled = 5 * this.scale < 48 ? 10 : 5;
-    for (let mm = labelled; mm <= reach; mm += labelled) this.onTissue(g, `${mm} mm`, mm * this.scale, 10);
+    for (let mm = labelled; mm <= reach; mm += labelled) {
+      const [x, y] = [this.x(this.axis.fromX + mm * this.axis.x), this.y(this.axis.fromY + mm * this.axis.y)];
+      const onBar = x > width - 5 * this.scale - 48 && y > height - 64;
+      if (!onBar) this.onTissue(g, `${mm} mm`, mm * this.scale, 10);
+    }
     g.restore();
   }
 

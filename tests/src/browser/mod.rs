@@ -20,7 +20,7 @@ use std::time::Duration;
 
 /// Long enough for whatever a test waits for, on a machine that has little time for it; what comes
 /// sooner is waited for no longer.
-pub const PATIENCE: Duration = Duration::from_secs(180);
+pub const PATIENCE: Duration = Duration::from_secs(300);
 
 /// The browser's error, in one sentence.
 pub type Error = String;
