@@ -160,11 +160,14 @@ impl EffectEvidence {
     /// The requirement on its share that it does not meet, if there is one.
     fn too_small(&self) -> Option<Rejection> {
         let share = self.share;
-        if share < LEAST_SHARE {
-            return Some(Rejection::TooSmall { share });
-        }
-        if share < SHARE && !self.is_certain() && !self.takes_most_of_the_rest() {
-            return Some(Rejection::SmallAndUnsure { share, least: SHARE, z: self.steadiest_z() });
+        // Beside a much larger effect the share of what the refit leaves is small.
+        if !self.takes_most_of_the_rest() {
+            if share < LEAST_SHARE {
+                return Some(Rejection::TooSmall { share });
+            }
+            if share < SHARE && !self.is_certain() {
+                return Some(Rejection::SmallAndUnsure { share, least: SHARE, z: self.steadiest_z() });
+            }
         }
         (share < FAIR_SHARE && !self.stands_out()).then(|| Rejection::SmallAndUnsure {
             share,
@@ -183,14 +186,30 @@ impl EffectEvidence {
     /// Returns why an effect may not be named: the first requirement that it does not meet; none if
     /// it meets all.
     pub(crate) fn rejection(&self) -> Option<Rejection> {
+        self.unsure_gain().or_else(|| self.doubtful_law())
+    }
+
+    /// The same of evidence that the search gathers on fitted recordings alone.
+    pub(crate) fn rejection_in_search(&self) -> Option<Rejection> {
+        let z = |gain: &Gain| gain.z.max(gain.clipped_z);
+        let (fit_z, filter_z, share) = (z(&self.fit), z(&self.holdout), self.share);
+        let unsure = self.unsure_gain().map(|_| Rejection::NotSureInSearch { fit_z, filter_z, share });
+        unsure.or_else(|| self.doubtful_law())
+    }
+
+    /// The requirement on its gain that it does not meet, if there is one.
+    fn unsure_gain(&self) -> Option<Rejection> {
         if !self.generalises() {
             return Some(self.unsure());
         }
         let on_fit = self.fit.z.max(self.fit.clipped_z);
         let rare = on_fit < UNLIKELY_Z && self.holdout.z < SURE_Z;
-        if rare && !self.recurs() && !self.agrees_everywhere() && !self.predicts() {
-            return Some(Rejection::FewMoments { fit_z: on_fit, holdout_z: self.holdout.z });
-        }
+        (rare && !self.recurs() && !self.agrees_everywhere() && !self.predicts())
+            .then_some(Rejection::FewMoments { fit_z: on_fit, holdout_z: self.holdout.z })
+    }
+
+    /// The requirement on its share, waves or values that it does not meet, if there is one.
+    fn doubtful_law(&self) -> Option<Rejection> {
         self.too_small()
             .or_else(|| (!self.is_comb).then_some(Rejection::NotPeriodic))
             .or_else(|| self.at_bound.then_some(Rejection::AtLimit))
@@ -205,6 +224,8 @@ pub(crate) struct Rival {
     pub(crate) effect: Effect,
     /// Mean lead of the winner over its standard error, over all segments.
     pub(crate) z: f64,
+    /// The same over the left-out stretches of the fitted recordings alone.
+    pub(crate) fit_z: f64,
     /// Lead of the winner in log-likelihood, and how much of it is on held-out recordings.
     pub(crate) lead: f64,
     pub(crate) held_out_lead: f64,

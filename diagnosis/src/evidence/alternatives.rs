@@ -99,25 +99,30 @@ impl Contest<'_> {
         let holdout = self.holdout.judging(&best.model, context.span);
         let holdout = known(&holdout, &rival.model, context.span);
         let own = costs(best, context.nominal, &holdout);
-        let lead = |rival: &FittedModel| {
+        let fitted = rival.fit.prepared.iter().map(|one| one.segments.len()).sum::<usize>();
+        let leads = |rival: &FittedModel| -> Vec<f64> {
             let theirs = costs(rival, context.nominal, &holdout);
-            let leads: Vec<f64> = theirs.iter().zip(&own).map(|(a, b)| a - b).collect();
-            let fitted = rival.fit.prepared.iter().map(|one| one.segments.len()).sum::<usize>();
-            (bootstrap(&leads), leads[fitted..].iter().sum::<f64>())
+            theirs.iter().zip(&own).map(|(a, b)| a - b).collect()
         };
-        let (mut gain, mut held_out) = lead(&rival);
-        if gain.z < WITHIN_REACH {
+        let mut lead = leads(&rival);
+        let mut on_fit = bootstrap(&lead[..fitted]);
+        if on_fit.z < WITHIN_REACH {
             // A rival that may be near is fitted as well as the winner was.
             let polished = FittedModel { noise: best.noise, ..context.polish_one(&rival) };
-            let again = lead(&polished);
-            if again.0.sum < gain.sum {
-                ((gain, held_out), rival) = (again, polished);
+            let again = leads(&polished);
+            let gain = bootstrap(&again[..fitted]);
+            if gain.sum < on_fit.sum {
+                (lead, on_fit, rival) = (again, gain, polished);
             }
         }
+        let gain = bootstrap(&lead);
         let last = rival.model.effects.len() - 1;
-        let absence = (gain.z < BEHIND_Z).then(|| parameters::absence(context, &rival, last)).flatten();
+        let is_near = gain.z.min(on_fit.z) < BEHIND_Z;
+        let absence = is_near.then(|| parameters::absence(context, &rival, last)).flatten();
         let effect = rival.model.effects[last].clone();
-        Rival { name: effect.name, effect, z: gain.z, lead: gain.sum, held_out_lead: held_out, absence }
+        let held_out_lead = lead[fitted..].iter().sum();
+        let (z, lead, fit_z) = (gain.z, gain.sum, on_fit.z);
+        Rival { name: effect.name, effect, z, fit_z, lead, held_out_lead, absence }
     }
 
     /// Puts those near rivals behind that only a white noise takes for as good as the winner.
@@ -125,26 +130,28 @@ impl Contest<'_> {
         let merit = |model: Model| self.context.fit_slow(model, &[&self.slow.noise]).merit;
         // Needed only where a rival is near, and the same for all of them.
         let mut without = None;
-        for (rival, (effect, _)) in rivals.iter_mut().zip(others).filter(|(rival, _)| rival.z < BEHIND_Z) {
+        let is_near = |rival: &Rival| rival.z < BEHIND_Z || rival.fit_z < -LEADS_Z;
+        for (rival, (effect, _)) in rivals.iter_mut().zip(others).filter(|(rival, _)| is_near(rival)) {
             let theirs = merit(with(base, effect));
             let without = *without.get_or_insert_with(|| merit(base.clone()));
             let behind = self.slow.merit - theirs;
             if behind > 0.5 * (self.slow.merit - without) && behind > BEHIND_SLOW_NATS {
-                rival.z = BEHIND_SLOW_Z;
+                (rival.z, rival.fit_z) = (rival.z.max(BEHIND_SLOW_Z), BEHIND_SLOW_Z);
                 rival.lead = rival.lead.max(behind);
             }
         }
     }
 }
 
-/// Returns the rival that leads by most, with the place of the effect that it leads; none where no
-/// effect is led. Effects that shares of the force error name met their rivals there.
+/// Returns the rival that leads by most on left-out stretches of the fitted recordings, with the
+/// place of the effect that it leads; none where no effect is led. Effects that shares of the force
+/// error name met their rivals there.
 pub(crate) fn leader(found: &[EffectEvidence]) -> Option<(usize, Effect)> {
-    let leads = |rival: &&Rival| rival.z < -LEADS_Z && rival.absence.is_none();
+    let leads = |rival: &&Rival| rival.fit_z < -LEADS_Z && rival.absence.is_none();
     let by_likelihood = found.iter().enumerate().filter(|(_, one)| one.material.is_none());
     let all = by_likelihood.flat_map(|(i, one)| one.rivals.iter().filter(leads).map(move |rival| (i, rival)));
     let is_new = |rival: &Rival| found.iter().all(|one| one.effect.name != rival.name);
-    let best = all.filter(|(_, rival)| is_new(rival)).min_by(|a, b| a.1.z.total_cmp(&b.1.z));
+    let best = all.filter(|(_, rival)| is_new(rival)).min_by(|a, b| a.1.fit_z.total_cmp(&b.1.fit_z));
     best.map(|(i, rival)| (i, rival.effect.clone()))
 }
 

@@ -10,6 +10,10 @@ use numerics::bootstrap::Gain;
 pub(crate) enum Rejection {
     /// A slow disturbance explains as much.
     SlowDisturbance,
+    /// Its gain is not sure on stretches of the fitted recordings that were left out of the fit,
+    /// `fit_z` standard errors, and on these recordings as a filter follows them, `filter_z`. The
+    /// search reads no held-out recording.
+    NotSureInSearch { fit_z: f64, filter_z: f64, share: f64 },
     /// Held-out recordings are less likely with the effect.
     LessLikely { nats: f64 },
     /// The gain on held-out recordings is too few standard errors.

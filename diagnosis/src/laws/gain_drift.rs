@@ -113,7 +113,7 @@ impl EffectSearch for Defined {
     fn limits(&self, _term: usize, allowed: &Allowed) -> (f64, f64) {
         // At most this part of the smallest gain that the rig allows: a drive that drifts to
         // nothing is no drift.
-        let least = 0.6 * allowed.gain.abs() / allowed.gain_reach;
+        let least = 0.9 * allowed.gain.abs() / allowed.gain_reach;
         (-least, least)
     }
     fn twins(&self, _effect: &Effect, shown: &Shown) -> Vec<EffectName> {

@@ -80,8 +80,8 @@ struct Tried {
 /// The model with one more effect.
 struct Next {
     state: SearchState,
-    /// True if the effect generalises to what its fit left out; otherwise it is likely to generalise
-    /// together with another effect.
+    /// True if the effect generalises to what its fit left out; otherwise it is likely to
+    /// generalise together with another effect.
     generalises: bool,
 }
 
@@ -178,8 +178,8 @@ impl Search<'_> {
             let finalist = with_enough_laws(&on, finalist);
             match self.judge(now, finalist, promising.is_none()) {
                 Judged::Generalises(state) => return Some(Next { state, generalises: true }),
-                Judged::Rejected { holdout_gain, why, provisional } => {
-                    tried.rejected.push(RejectedHypothesis { name, holdout_gain, why });
+                Judged::Rejected { why, provisional } => {
+                    tried.rejected.push(RejectedHypothesis { name, holdout_gain: None, why });
                     let next = |state| Next { state, generalises: false };
                     promising = promising.or_else(|| provisional.map(next));
                 }
@@ -194,11 +194,7 @@ impl Search<'_> {
         let on = self.context(&now.tracks);
         let with = on.fit_slow(finalist.model.clone(), &[&now.slow.noise, &finalist.noise]);
         if with.merit - now.slow.merit < MIN_LOG_LIKELIHOOD_GAIN {
-            return Judged::Rejected {
-                holdout_gain: None,
-                why: Rejection::SlowDisturbance,
-                provisional: None,
-            };
+            return Judged::Rejected { why: Rejection::SlowDisturbance, provisional: None };
         }
         let (tracks, white) = in_its_own_motion(&now.tracks, finalist, &on);
         let own = self.context(&tracks);
@@ -206,17 +202,15 @@ impl Search<'_> {
         let judged =
             gather_evidence(&own, &white, &with.noise, &judging).pop().expect("the last effect is judged");
         let last = white.model.effects.len() - 1;
-        let rejection = judged.rejection().or_else(|| parameters::absence(&own, &white, last));
+        let rejection = judged.rejection_in_search().or_else(|| parameters::absence(&own, &white, last));
         let is_kept = rejection.is_none() || (may_promise && judged.is_provisional());
         let slow = is_kept.then(|| own.fit_slow(white.model.clone(), &[&with.noise, &white.noise]));
         let state = slow.map(|slow| SearchState { white, slow, tracks, judging });
         match (rejection, state) {
             (None, Some(state)) => Judged::Generalises(state),
-            (why, provisional) => Judged::Rejected {
-                holdout_gain: Some(judged.holdout.sum),
-                why: why.expect("what is not rejected is kept"),
-                provisional,
-            },
+            (why, provisional) => {
+                Judged::Rejected { why: why.expect("what is not rejected is kept"), provisional }
+            }
         }
     }
 
@@ -260,8 +254,6 @@ fn with_enough_laws(on: &FitContext, candidate: FittedModel) -> FittedModel {
 enum Judged {
     Generalises(SearchState),
     Rejected {
-        /// Gain on held-out recordings, nats; none where it was not judged there.
-        holdout_gain: Option<f64>,
         why: Rejection,
         /// The model, where the effect may generalise together with another effect.
         provisional: Option<SearchState>,

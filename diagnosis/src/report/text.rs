@@ -12,6 +12,10 @@ use numerics::digits::short;
 pub(crate) fn rejection(why: &Rejection) -> String {
     match why {
         Rejection::SlowDisturbance => "a slow disturbance explains as much".into(),
+        Rejection::NotSureInSearch { fit_z, filter_z, share } => format!(
+            "the search found it unsure: its gain is {fit_z:.1} standard errors on stretches of the fitted recordings that were left out of the fit and {filter_z:.1} as a filter follows these recordings, and it explains {:.0} % of what the noise leaves",
+            100.0 * share.max(0.0)
+        ),
         Rejection::LessLikely { nats } => {
             format!("held-out recordings are less likely with it, by {nats:.0} nats")
         }

@@ -1,4 +1,5 @@
 use super::*;
+use crate::evidence::alternatives::leader;
 
 fn gain(sum: f64, low: f64, z: f64) -> Gain {
     Gain { sum, low, high: 2.0 * sum, z, clipped_z: z }
@@ -74,6 +75,9 @@ fn a_rejection_is_the_requirement_that_is_not_met() {
     let little = rejection(|found| (found.share, found.fit) = (0.03, gain(90.0, 10.0, 4.0)));
     assert_eq!(little, Rejection::SmallAndUnsure { share: 0.03, least: SHARE, z: 4.0 });
     assert_eq!(rejection(|found| found.share = 0.002), Rejection::TooSmall { share: 0.002 });
+    let searched = EffectEvidence { holdout: gain(661.0, 10.0, 1.4), sizes: vec![1.0, 2.0], ..found() };
+    let unsure = Rejection::NotSureInSearch { fit_z: 9.0, filter_z: 1.4, share: 0.9 };
+    assert_eq!(searched.rejection_in_search(), Some(unsure));
 }
 
 #[test]
@@ -172,7 +176,8 @@ fn a_right_law_leaves_little_and_is_as_large_everywhere() {
 #[test]
 fn a_small_part_must_be_certain() {
     assert!(may_be_named(|found| found.share = 0.04));
-    assert!(!may_be_named(|found| found.share = 0.005));
+    assert!(!may_be_named(|found| (found.share, found.force.sum) = (0.005, 0.4)));
+    assert!(may_be_named(|found| found.share = 0.005), "it takes most of what the others leave");
     assert!(!may_be_named(|found| {
         found.share = 0.04;
         found.holdout = gain(50.0, 20.0, 4.0);
@@ -206,4 +211,17 @@ fn an_effect_that_takes_less_than_a_twentieth_is_not_named() {
     let part = |off_force| EffectEvidence { off_force, ..found() };
     assert_eq!(part(0.04).immaterial(), Some(Rejection::Immaterial { part: 0.04 }));
     assert_eq!(part(0.06).immaterial(), None);
+}
+
+#[test]
+fn no_rival_leads_by_held_out_recordings() {
+    let rival = |name, fit_z, z| {
+        let effect = Effect::shaped(name, &[]);
+        Rival { name, effect, z, fit_z, lead: -40.0, held_out_lead: -60.0, absence: None }
+    };
+    let leads = |rivals| leader(&[EffectEvidence { rivals, ..found() }]).map(|(_, one)| one.name);
+    let ahead_held_out = rival(EffectName::Cogging, 0.5, -6.0);
+    assert_eq!(leads(vec![ahead_held_out.clone()]), None);
+    let ahead = rival(EffectName::Backlash, -1.5, 3.0);
+    assert_eq!(leads(vec![ahead_held_out, ahead]), Some(EffectName::Backlash));
 }
