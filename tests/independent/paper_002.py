@@ -1,6 +1,7 @@
 """Paper 002: second-order pre-puncture, the tracking wall, LuGre friction by fine RK4, the guide for the direction, withdrawal."""
 
 import math
+import tomllib
 
 import numpy
 from device import TICK_S, hand, way_between_counts
@@ -34,17 +35,17 @@ def shoulder(layers=LAYERS, scale=SCALE, skin_wall=True, entry_deg=45.0, law="")
     return text
 
 
-def lugre(depth_mm, sub=8):
+def lugre(depth_mm, sub=8, parameters=LUGRE):
     """The bristle state by the classical Runge-Kutta method, `sub` steps to a tick.
 
     dz/dt = v - s0 |v| z / g(v),  g = Fc + (Fs - Fc) exp(-(v/vs)^2),  F = s0 z + s1 dz/dt + s2 v.
     """
     speed = numpy.gradient(way_between_counts(depth_mm), TICK_S)
     force, z = numpy.zeros(len(speed)), 0.0
-    s0, step = LUGRE["s0"], TICK_S / sub
+    s0, step = parameters["s0"], TICK_S / sub
 
     def rate(z, v):
-        g = LUGRE["coulomb"] + (LUGRE["static"] - LUGRE["coulomb"]) * math.exp(-((v / LUGRE["stribeck"]) ** 2))
+        g = parameters["coulomb"] + (parameters["static"] - parameters["coulomb"]) * math.exp(-((v / parameters["stribeck"]) ** 2))
         return v - s0 * abs(v) * z / g
 
     for tick in range(len(speed)):
@@ -59,7 +60,7 @@ def lugre(depth_mm, sub=8):
                 k3 = rate(z + 0.5 * step * k2, middle)
                 k4 = rate(z + step * k3, b)
                 z += step * (k1 + 2.0 * k2 + 2.0 * k3 + k4) / 6.0
-        force[tick] = s0 * z + LUGRE["s1"] * rate(z, v0) + LUGRE["s2"] * v0
+        force[tick] = s0 * z + parameters["s1"] * rate(z, v0) + parameters["s2"] * v0
     return force
 
 
@@ -77,6 +78,38 @@ def periodic_penetration(device, report):
     settled = recording.depth_mm[rows] > 1.0
     report.within("LuGre by RK4, periodic penetration at 1 to 30 mm/s, rms", math.sqrt((difference[settled] ** 2).mean()), 0.010, "N")
     report.within("LuGre by RK4, the same, largest", numpy.abs(difference[settled]).max(), 0.060, "N")
+    found = fitted_friction(device, device.folder / f"{device.count:02}" / "a.mcap")
+    for key, wanted in (("stiffness_n_per_mm", SCALE * LUGRE["s0"]), ("sliding_n", SCALE * LUGRE["coulomb"]), ("sticking_n", SCALE * LUGRE["static"])):
+        report.within(f"LuGre fitted to that recording, {key}", found[key] / wanted - 1.0, 0.05, "of it")
+
+
+# Of a gum that nobody penetrated: far from what a fit would begin with.
+GUM = {"s0": 0.7, "s1": 0.0002, "s2": 0.004, "coulomb": 0.55, "static": 0.8, "stribeck": 5.0}
+
+
+def fitted_friction(device, recording):
+    """What `fit-friction` finds in a recording: the keys of a profile's friction."""
+    device._run("fit-friction", recording, "--out", device.folder / "friction.toml")
+    return tomllib.loads((device.folder / "friction.toml").read_text())["law"]["friction"]
+
+
+def identified_friction(device, report):
+    """The experiment of section V, on a sensor: to and fro in one block at paces of 0.5 to 40 mm/s, depths to 5 um, forces with 10 mN of noise and a zero of 50 mN."""
+    depth = [numpy.zeros(2000)]
+    for speed in (0.5, 2.0, 6.0, 15.0, 40.0, 1.0, 25.0):
+        way = numpy.arange(0.0, 4.0, speed * TICK_S)
+        depth += [way, 4.0 - way]
+    depth_mm = 8.0 + numpy.concatenate(depth)
+    noise = numpy.random.default_rng(5)
+    force_n = lugre(depth_mm, parameters=GUM) + 0.05 + noise.normal(0.0, 0.01, len(depth_mm))
+    rows = slice(None, None, 10)
+    table = numpy.column_stack([numpy.arange(len(depth_mm))[rows] * TICK_S, numpy.round(depth_mm[rows] / 0.005) * 0.005, force_n[rows]])
+    numpy.savetxt(device.folder / "gum.csv", table, delimiter=",", header="time_s,depth_mm,force_n", comments="", fmt="%.6f")
+    found = fitted_friction(device, device.folder / "gum.csv")
+    for key, name, allowed in (("stiffness_n_per_mm", "s0", 0.05), ("sliding_n", "coulomb", 0.03), ("sticking_n", "static", 0.03),
+                               ("viscous_n_s_per_mm", "s2", 0.10), ("stribeck_mm_s", "stribeck", 0.10)):  # fmt: skip
+        report.within(f"LuGre of a gum, {key}", found[key] / GUM[name] - 1.0, allowed, "of it")
+    report.within("LuGre of a gum, damping_n_s_per_mm", found["damping_n_s_per_mm"] - GUM["s1"], 2e-4, "N s/mm")
 
 
 def tracking_wall(depth_mm, layer_forces):
@@ -201,6 +234,7 @@ def check(device, report):
     skin_pushed_in(device, report)
     rate_before_the_puncture(device, report)
     periodic_penetration(device, report)
+    identified_friction(device, report)
     straight_injection(device, report)
     a_needle_that_stops(device, report)
     stages_at_rest(device, report)

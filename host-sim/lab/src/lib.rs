@@ -5,4 +5,5 @@ pub mod characterise;
 pub mod commission;
 pub mod compensate;
 pub mod force_fit;
+pub mod friction_fit;
 pub mod settle;

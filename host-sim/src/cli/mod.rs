@@ -12,6 +12,7 @@ mod diagnose_all;
 mod experiment;
 mod export;
 mod fit_force;
+mod fit_friction;
 mod import;
 mod import_page;
 mod man;
@@ -56,6 +57,7 @@ enum Command {
     Import(import::Import),
     Simulate(simulate::Simulate),
     FitForce(fit_force::FitForce),
+    FitFriction(fit_friction::FitFriction),
     Completions(completions::Completions),
     Man(man::Man),
 }
@@ -79,6 +81,7 @@ impl Cli {
             Some(Command::Import(command)) => command.run(),
             Some(Command::Simulate(command)) => command.run(),
             Some(Command::FitForce(command)) => command.run(),
+            Some(Command::FitFriction(command)) => command.run(),
             Some(Command::Completions(command)) => command.run(),
             Some(Command::Man(command)) => command.run(),
         }

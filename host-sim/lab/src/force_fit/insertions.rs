@@ -55,20 +55,34 @@ pub struct Insertion {
     pub points: Vec<(f64, f64)>,
 }
 
-/// All insertions of a file, MCAP or CSV by what is in it.
-pub fn read(path: &Path) -> Result<Vec<Insertion>, Error> {
+/// Whether a CSV has to say the angle of the needle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Angle {
+    /// A file without it is refused.
+    Needed,
+    /// It is not read, and 90° everywhere.
+    Ignored,
+}
+
+/// The stretches of a file, MCAP or CSV by what is in it.
+pub fn moments(path: &Path, angle: Angle) -> Result<Vec<Vec<Moment>>, Error> {
     let shown = path.display().to_string();
     let bytes = std::fs::read(path).map_err(|cause| {
         Error::input(format_args!("{shown}: the recording cannot be read ({cause}); check its path"))
     })?;
-    let series = if bytes.starts_with(mcap::MAGIC) {
-        from_recording(&Recording::parse(shown.clone(), &bytes)?)
-    } else {
-        let text = String::from_utf8(bytes).map_err(|_| {
-            Error::input(format_args!("{shown}: neither an MCAP recording nor a CSV file; give one of these"))
-        })?;
-        vec![parse_csv(&shown, &text)?]
-    };
+    if bytes.starts_with(mcap::MAGIC) {
+        return Ok(from_recording(&Recording::parse(shown, &bytes)?));
+    }
+    let text = String::from_utf8(bytes).map_err(|_| {
+        Error::input(format_args!("{shown}: neither an MCAP recording nor a CSV file; give one of these"))
+    })?;
+    Ok(vec![parse_csv(&shown, &text, angle)?])
+}
+
+/// All insertions of a file.
+pub fn read(path: &Path) -> Result<Vec<Insertion>, Error> {
+    let shown = path.display().to_string();
+    let series = moments(path, Angle::Needed)?;
     series.iter().try_for_each(|moments| check_force(&shown, moments))?;
     let found: Vec<Insertion> = series
         .iter()
@@ -133,9 +147,9 @@ fn from_recording(recording: &Recording) -> Vec<Vec<Moment>> {
     moments.collect()
 }
 
-/// `time_s,depth_mm,force_n` and `angle_deg` or `tilt_rad`, in any order; other columns are
-/// ignored.
-fn parse_csv(file: &str, text: &str) -> Result<Vec<Moment>, Error> {
+/// `time_s,depth_mm,force_n` and, where it is needed, `angle_deg` or `tilt_rad`, in any order; other
+/// columns are ignored.
+fn parse_csv(file: &str, text: &str, angle: Angle) -> Result<Vec<Moment>, Error> {
     let mut lines = text.lines().enumerate();
     let header = lines.next().map_or("", |(_, line)| line).trim_start_matches('\u{feff}');
     let names: Vec<&str> = header.split(',').map(str::trim).collect();
@@ -143,14 +157,16 @@ fn parse_csv(file: &str, text: &str) -> Result<Vec<Moment>, Error> {
     let needed = |name: &str| {
         column(name).ok_or_else(|| {
             Error::input(format_args!(
-                "{file}, line 1: has no column {name}; time_s, depth_mm, force_n and angle_deg are needed"
+                "{file}, line 1: has no column {name}; time_s, depth_mm, force_n{} are needed",
+                if angle == Angle::Needed { " and angle_deg" } else { "" }
             ))
         })
     };
     let (time, depth, force) = (needed("time_s")?, needed("depth_mm")?, needed("force_n")?);
-    let (angle, to_degrees) = match column("tilt_rad") {
-        Some(tilt) if column("angle_deg").is_none() => (tilt, 180.0 / std::f64::consts::PI),
-        _ => (needed("angle_deg")?, 1.0),
+    let angle = match column("tilt_rad") {
+        _ if angle == Angle::Ignored => None,
+        Some(tilt) if column("angle_deg").is_none() => Some((tilt, 180.0 / std::f64::consts::PI)),
+        _ => Some((needed("angle_deg")?, 1.0)),
     };
     let mut moments: Vec<Moment> = Vec::new();
     for (index, line) in lines.filter(|(_, line)| !line.trim().is_empty()) {
@@ -170,7 +186,10 @@ fn parse_csv(file: &str, text: &str) -> Result<Vec<Moment>, Error> {
             time_s: number(time)?,
             depth_mm: number(depth)?,
             force_n: number(force)?,
-            angle_deg: number(angle)? * to_degrees,
+            angle_deg: match angle {
+                Some((column, to_degrees)) => number(column)? * to_degrees,
+                None => 90.0,
+            },
         };
         if moments.last().is_some_and(|last| last.time_s >= moment.time_s) {
             return Err(Error::input(format_args!(
@@ -262,7 +281,7 @@ mod tests {
 
     #[test]
     fn every_way_in_is_found_with_its_speed_and_angle() {
-        let moments = parse_csv("a.csv", &csv(3.0, "30")).expect("well formed");
+        let moments = parse_csv("a.csv", &csv(3.0, "30"), Angle::Needed).expect("well formed");
         let found: Vec<Insertion> = ways_in(&moments).into_iter().filter_map(even_part).collect();
         assert_eq!(found.len(), 2);
         for one in found {
@@ -285,7 +304,7 @@ mod tests {
             (good.replacen("45,0.010,", "nan,0.010,", 1), ["line 4", "angle_deg"]),
             (good.replacen("45,0.010,x,", "45,0.010,x", 1), ["line 4", "force_n"]),
         ] {
-            let said = parse_csv("a.csv", &wrong).expect_err(hints[1]).to_string();
+            let said = parse_csv("a.csv", &wrong, Angle::Needed).expect_err(hints[1]).to_string();
             assert!(hints.iter().all(|hint| said.contains(hint)) && said.contains("a.csv"), "{said}");
         }
     }
