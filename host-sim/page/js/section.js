@@ -262,7 +262,7 @@ export class Section {
     }
   }
 
-  /** Depth along the needle, where it will go: a tick each mm, a number each five. */
+  /** Depth along the needle, where it will go: a tick each mm, a number where there is room for it. */
   ruler(g, tissue, width, height) {
     const far = tissue.vessel?.far_mm ?? tissue.layers.at(-1)?.depth_mm ?? 5;
     const reach = Math.min(Math.ceil(far / Math.max(this.axis.y, 0.1) + 3), tissue.needle.length_mm);
@@ -287,8 +287,7 @@ export class Section {
     g.font = `600 12px ${this.colours.font}`;
     g.textAlign = "center";
     g.textBaseline = "top";
-    // Where five millimetres are narrower than their label, every second one has it.
-    const labelled = 5 * this.scale < 48 ? 10 : 5;
+    const labelled = [5, 10, 20].find((mm) => mm * this.scale >= 48) ?? 50;
     for (let mm = labelled; mm <= reach; mm += labelled) {
       const [x, y] = [this.x(this.axis.fromX + mm * this.axis.x), this.y(this.axis.fromY + mm * this.axis.y)];
       const onBar = x > width - 5 * this.scale - 48 && y > height - 64;
