@@ -78,6 +78,7 @@ fn visit() -> Result<(), Error> {
     end_recording(&mut page)?;
     both_can_be_read(&places.program, &scratch)?;
     pass_mark(&mut page)?;
+    a_sheet_to_sign(&mut page)?;
     complaints(&mut page)
 }
 
@@ -164,6 +165,23 @@ fn both_can_be_read(program: &Path, scratch: &Path) -> Result<(), Error> {
     )?;
     let second = score("monday-2.mcap")?;
     check("none in the second", second.status.code() == Some(2), String::from_utf8_lossy(&second.stderr))
+}
+
+/// The session on paper: the name, a row for each attempt of the person, and the learning curve.
+fn a_sheet_to_sign(page: &mut Page) -> Result<(), Error> {
+    page.evaluate("window.print = () => {}; document.getElementById('trainee').value = 'Ada'")?;
+    page.click("print-session")?;
+    let sheet = page.text("document.getElementById('sheet').textContent")?;
+    let rows = page.number("document.querySelectorAll('#sheet tr').length")?;
+    let own =
+        page.number(&format!("[...{ROWS}].filter((row) => !row.textContent.includes('demo')).length"))?;
+    check(
+        "a name, a heading and a row an attempt",
+        sheet.contains("Ada") && rows == own + 1.0,
+        (&sheet, own),
+    )?;
+    let inked = "[...document.querySelector('#sheet canvas').getContext('2d').getImageData(0, 0, 300, 40).data].some((v) => v > 0)";
+    check("the curve is on it", page.evaluate(inked)? == true, "blank paper")
 }
 
 /// Eight successes in a row pass, seven do not, and a miss puts it off: Kestin's rule at 20 and 40
