@@ -4,7 +4,6 @@
 
 use crate::fit::blocked_recording::BlockedRecording;
 use crate::fit::force_residual::Estimator;
-use crate::thresholds::MISTAKEN;
 use numerics::golden_section::golden;
 use numerics::parallel;
 use std::f64::consts::TAU;
@@ -36,24 +35,6 @@ pub(crate) struct TonalDisturbance {
     pub(crate) taken: f64,
     /// Part of the rest, which does not swing so, that the effects found take.
     pub(crate) taken_beside: f64,
-}
-
-/// The smallest part at which a swing is the missing physics.
-const DOMINANT: f64 = 0.4;
-/// Part of the rest from which effects explain more than a swing: a delay leaves much where its
-/// command has a tone, and something everywhere else.
-const MORE_THAN_SWING: f64 = 0.3;
-
-impl TonalDisturbance {
-    /// True if the effects found explain a swing and little else.
-    pub(crate) fn is_mistaken(&self) -> bool {
-        self.taken > MISTAKEN && self.taken_beside < MORE_THAN_SWING
-    }
-
-    /// True if the swing is what was left out.
-    pub(crate) fn is_left_out(&self) -> bool {
-        self.part > DOMINANT || self.is_mistaken()
-    }
 }
 
 /// The drive's force, and the residuals of the refitted and of the patched model.

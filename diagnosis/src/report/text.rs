@@ -1,10 +1,10 @@
 //! The clauses of a report that say why an effect is not named, and why nothing is; `outcome` makes
 //! the headline. Nothing reads one to decide.
 
-use crate::evidence::rejection::{Rather, Rejection, Weakness};
-use crate::pipeline::diagnosis::Reason;
+use crate::decide::diagnosis::Reason;
+use crate::decide::rejection::{Rather, Rejection, Weakness};
+use crate::decide::thresholds::{CERTAIN_Z, LEAST_SHARE, MATERIAL, SURE_Z, UNLIKELY_Z, UNSURE_SHARE};
 use crate::propose::untested::NotTested;
-use crate::thresholds::{CERTAIN_Z, LEAST_SHARE, MATERIAL, SURE_Z, UNLIKELY_Z, UNSURE_SHARE};
 use numerics::bootstrap::Gain;
 use numerics::digits::short;
 

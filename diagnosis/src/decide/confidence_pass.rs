@@ -1,30 +1,31 @@
 //! The confidence of each effect found. Effects that are too unsure are removed and the rest is
 //! weighed again: a false effect takes evidence from a true one.
 
-use crate::evidence::acceptance_criteria::EffectEvidence;
-use crate::evidence::alternatives;
+use crate::decide::acceptance_criteria::gather_evidence;
+use crate::decide::confidence::{self, Leftover};
+use crate::decide::contradictions::creeps;
+use crate::decide::elimination::{StandingModel, eliminate};
+use crate::decide::material::Material;
+use crate::decide::out_of_library;
+use crate::decide::rivals;
+use crate::decide::thresholds::{
+    BEHIND_Z, LEAVES_MUCH, LIMITED_BY_PHYSICS, MUCH_OF_REFIT, NAMED, SUREST_BESIDE_PHYSICS, UNDECIDED,
+    UNDERSTOOD,
+};
+use crate::decide::weighed_model::{WeighedEffect, WeighedModel};
 use crate::evidence::comparison::Shown;
-use crate::evidence::confidence::{self, Leftover};
-use crate::evidence::effect_evidence::gather_evidence;
-use crate::evidence::elimination::{StandingModel, eliminate};
+use crate::evidence::effect_evidence::EffectEvidence;
 use crate::evidence::holdout_set::HoldoutSet;
-use crate::evidence::out_of_library;
 use crate::evidence::parameters;
 use crate::evidence::repeats::correlation_of_repeats;
 use crate::evidence::residuals::{Residuals, above};
 use crate::evidence::tonal;
-use crate::evidence::weighed_model::{WeighedEffect, WeighedModel};
 use crate::fit::blocked_recording::BlockedRecording;
 use crate::fit::force_residual::Estimator;
 use crate::fit::model::Model;
 use crate::laws::{Effect, EffectName};
-use crate::propose::candidates;
 use crate::propose::context::{FitContext, FittedModel};
 use crate::propose::excitation::Excitation;
-use crate::thresholds::{
-    BEHIND_Z, LEAVES_MUCH, LIMITED_BY_PHYSICS, MUCH_OF_REFIT, NAMED, SUREST_BESIDE_PHYSICS, UNDECIDED,
-    UNDERSTOOD,
-};
 
 /// Least part of a residual's mean square that counts as more than chance.
 const LEAST_ABOVE: f64 = 0.02;
@@ -112,7 +113,12 @@ impl Scales<'_> {
             hertz.and_then(|hertz| tonal::swing(&estimator, hertz, &left_by(&holdout.smoothed, on_holdout)));
         let repeats = self.repeats(&shown, &estimator);
         let effects = found.into_iter().enumerate();
-        let effects = effects.map(|(i, found)| self.weigh_effect(found, i, &shown.patched, &left)).collect();
+        let effects = effects
+            .map(|(i, found)| {
+                let material = Material::find(&materials, found.effect.name).cloned();
+                self.weigh_effect(found, material, i, &shown.patched, &left)
+            })
+            .collect();
         WeighedModel {
             effects,
             dropped: Vec::new(),
@@ -135,12 +141,12 @@ impl Scales<'_> {
     fn against_rivals(&self, mut standing: StandingModel) -> (StandingModel, FittedModel) {
         let contest = |standing: &mut StandingModel, patched: &FittedModel| {
             let StandingModel { model, effects, .. } = standing;
-            alternatives::fit_rivals(self.context, patched, model, self.holdout, effects);
+            rivals::fit_rivals(self.context, patched, model, self.holdout, effects);
         };
         let StandingModel { model: last, materials, .. } = &standing;
         let patched = self.context.fit_shown(last.model.clone(), &last.noise, !materials.is_empty());
         contest(&mut standing, &patched);
-        let leader = alternatives::leader(&standing.effects);
+        let leader = rivals::leader(&standing.effects, &standing.materials);
         match leader.and_then(|(i, rival)| self.replaced(&standing, i, rival)) {
             Some((mut other, patched)) => {
                 contest(&mut other, &patched);
@@ -165,8 +171,8 @@ impl Scales<'_> {
         let slow = context.fit_slow(with, &[&self.null.noise, &model.noise]);
         let white = context.fit_shown(slow.model.clone(), &slow.noise, !materials.is_empty());
         let effects = gather_evidence(context, &white, &slow.noise, holdout);
-        let may_stand = effects.iter().all(|one| one.rejection().is_none())
-            && parameters::absence(context, &white, i).is_none();
+        let may_stand =
+            effects.iter().all(|one| one.rejection().is_none()) && !parameters::is_absent(context, &white, i);
         let (rejected, materials) = (rejected.clone(), materials.clone());
         may_stand.then_some((StandingModel { model: slow, effects, rejected, materials }, white))
     }
@@ -215,6 +221,7 @@ impl Scales<'_> {
     fn weigh_effect(
         &self,
         found: EffectEvidence,
+        material: Option<Material>,
         i: usize,
         patched: &FittedModel,
         left: &LeftOver,
@@ -230,18 +237,19 @@ impl Scales<'_> {
             undecided: false,
             creeps: None,
             found,
+            material,
             evidence,
             parameters,
             rather,
         };
         let found = &weighed.found;
-        if let Some(material) = &found.material {
+        if let Some(material) = &weighed.material {
             weighed.is_there = parameters::has_size(found.effect.name, &weighed.parameters);
             (weighed.class, weighed.confidence) = (material.class.clone(), material.confidence());
             return weighed;
         }
-        let class = alternatives::class(found, self.excitation, left.leaves_much, context);
-        weighed.undecided = alternatives::nearest(found, &class) < BEHIND_Z;
+        let class = rivals::class(found, self.excitation, left.leaves_much, context);
+        weighed.undecided = rivals::nearest(found, &class) < BEHIND_Z;
         // Shares take each recording's bias off, so they do not see what may be constant.
         let is_seen = !found.effect.name.definition().may_be_constant();
         let most = match (weighed.undecided, left.is_other_physics && is_seen) {
@@ -249,7 +257,7 @@ impl Scales<'_> {
             (false, true) => SUREST_BESIDE_PHYSICS,
             (false, false) => 1.0,
         };
-        weighed.creeps = candidates::creeps(&found.effect, context.span)
+        weighed.creeps = creeps(&found.effect, context.span)
             // A spring that creeps depends on time, so no law of the travel fits it everywhere,
             // however far it bends.
             .filter(|_| !found.fits_everywhere());

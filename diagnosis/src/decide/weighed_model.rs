@@ -1,24 +1,26 @@
 //! A model with the confidence of each of its effects, and what speaks against one of them.
 
 use crate::data::schema::Parameter;
-use crate::evidence::acceptance_criteria::EffectEvidence;
+use crate::decide::confidence::{self, Evidence};
+use crate::decide::contradictions::{are_alike, is_mistaken, same_joint};
+use crate::decide::elimination::RejectedHypothesis;
+use crate::decide::material::Material;
+use crate::decide::rejection::{Rather, Rejection};
+use crate::decide::thresholds::NAMED;
 use crate::evidence::comparison::Shown;
-use crate::evidence::confidence::{self, Evidence};
-use crate::evidence::contradictions::{are_alike, same_joint};
-use crate::evidence::elimination::RejectedHypothesis;
-use crate::evidence::material::Material;
-use crate::evidence::rejection::{Rather, Rejection};
+use crate::evidence::effect_evidence::EffectEvidence;
 use crate::evidence::tonal::TonalDisturbance;
 use crate::fit::force_residual::Estimator;
 use crate::laws::EffectName;
 use crate::laws::definition::Definition;
 use crate::propose::context::FittedModel;
-use crate::thresholds::NAMED;
 use std::collections::BTreeMap;
 
 /// One effect with what speaks for and against it.
 pub(crate) struct WeighedEffect {
     pub(crate) found: EffectEvidence,
+    /// Its part in the force error, where that names it.
+    pub(crate) material: Option<Material>,
     pub(crate) class: Vec<EffectName>,
     pub(crate) evidence: Evidence,
     pub(crate) confidence: f64,
@@ -92,7 +94,7 @@ impl WeighedModel {
     }
 
     pub(crate) fn stands_for_swing(&self) -> bool {
-        self.swing.is_some_and(|swing| swing.is_mistaken())
+        self.swing.as_ref().is_some_and(is_mistaken)
     }
 
     /// The effect that explains most, with what it would rather be, where something without a name
@@ -173,12 +175,12 @@ impl WeighedModel {
         if let Some(from) = self.twin_beside(assessed) {
             return Some(Rejection::Indistinguishable { from });
         }
-        if assessed.found.material.is_some() {
+        if assessed.material.is_some() {
             // Its shares of the force error, fitted and held out, were judged before it was fitted.
             let no_size = (!assessed.is_there).then_some(Rejection::NoSize);
             return no_size.or_else(|| assessed.found.immaterial());
         }
-        if let Some(swing) = self.swing.filter(TonalDisturbance::is_mistaken) {
+        if let Some(swing) = self.swing.filter(is_mistaken) {
             Some(Rejection::Swing { hertz: swing.hertz })
         } else if !assessed.is_there {
             Some(Rejection::NoSize)

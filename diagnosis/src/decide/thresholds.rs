@@ -1,6 +1,6 @@
-//! Every number that admits or rejects a name, in one place, with its unit and what it means.
-//! Whatever only limits a search (steps, grids, how many candidates are fitted) is where it is
-//! used.
+//! Every number that decides a name, a verdict or a confidence, in one place, with its unit, its
+//! meaning and its source. Whatever only limits a search (steps, grids, how many candidates are
+//! fitted) is where it is used.
 //!
 //! Shares are parts of the refit's mean square above the noise; z is a gain over its standard
 //! error; nats are log-likelihood. Where no other source is given a number was set by hand on
@@ -132,13 +132,14 @@ pub(crate) const LEAVES_MUCH: f64 = 0.3;
 /// Nats under coloured noise, after the cost of freedom, below which an effect is not judged at
 /// all.
 pub(crate) const MIN_LOG_LIKELIHOOD_GAIN: f64 = 6.0;
-/// Parts of what it is at first that a dry friction may gain with time.
-pub(crate) const DRIFT: Range<f64> = -0.95..3.0;
 /// Most of the travel, as a part of it, over which bristles bend: microns of a slide, tenths of a
 /// degree of a turn.
 pub(crate) const BRISTLES: f64 = 0.03;
-/// A value within this part of a bound counts as at the bound.
-pub(crate) const AT_END: f64 = 0.05;
+/// The smallest part of a refit's residual at which a swing is the missing physics.
+pub(crate) const DOMINANT: f64 = 0.4;
+/// Part of the rest from which effects explain more than a swing: a delay leaves much where its
+/// command has a tone, and something everywhere else.
+pub(crate) const MORE_THAN_SWING: f64 = 0.3;
 /// Part of the refit's residual, at one frequency that does not follow the axis, from which effects
 /// that explain it are rejected as standing for that oscillation.
 pub(crate) const MISTAKEN: f64 = 0.2;

@@ -1,7 +1,9 @@
 //! Effects that cannot both be named, or that another cause explains together.
 
-use crate::laws::EffectName;
-use crate::thresholds::ALIKE;
+use crate::decide::thresholds::{ALIKE, BRISTLES, DOMINANT, MISTAKEN, MORE_THAN_SWING};
+use crate::evidence::tonal::TonalDisturbance;
+use crate::laws::definition::Span;
+use crate::laws::{Effect, EffectName};
 
 /// The effect that explains more of the joint between motor and load, where both are of it: what
 /// the law of one leaves next to reversals the other takes. Effects with what they gain.
@@ -18,6 +20,23 @@ pub(super) fn same_joint(
 pub(super) fn are_alike(gain: f64, friction: f64) -> bool {
     let ratio = friction / gain;
     ratio < ALIKE && ratio * ALIKE > 1.0
+}
+
+/// Part of the travel over which an effect gives way after a reversal, where that is more than
+/// bristles do: such a spring creeps.
+pub(super) fn creeps(effect: &Effect, span: &Span) -> Option<f64> {
+    let part = effect.name.definition().gives_way_over(effect)? / span.travel();
+    (part > BRISTLES).then_some(part)
+}
+
+/// True if the effects found explain a swing and little else.
+pub(super) fn is_mistaken(swing: &TonalDisturbance) -> bool {
+    swing.taken > MISTAKEN && swing.taken_beside < MORE_THAN_SWING
+}
+
+/// True if a swing is what was left out.
+pub(super) fn is_left_out(swing: &TonalDisturbance) -> bool {
+    swing.part > DOMINANT || is_mistaken(swing)
 }
 
 #[cfg(test)]
