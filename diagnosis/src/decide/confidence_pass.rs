@@ -3,14 +3,13 @@
 
 use crate::decide::acceptance_criteria::gather_evidence;
 use crate::decide::confidence::{self, Leftover};
-use crate::decide::contradictions::creeps;
 use crate::decide::elimination::{StandingModel, eliminate};
 use crate::decide::material::Material;
 use crate::decide::out_of_library;
 use crate::decide::rivals;
 use crate::decide::thresholds::{
-    BEHIND_Z, LEAVES_MUCH, LIMITED_BY_PHYSICS, MUCH_OF_REFIT, NAMED, SUREST_BESIDE_PHYSICS, UNDECIDED,
-    UNDERSTOOD,
+    BEHIND_Z, BRISTLES, LEAVES_MUCH, LIMITED_BY_PHYSICS, MUCH_OF_REFIT, NAMED, SUREST_BESIDE_PHYSICS,
+    UNDECIDED, UNDERSTOOD,
 };
 use crate::decide::weighed_model::{WeighedEffect, WeighedModel};
 use crate::evidence::comparison::Shown;
@@ -22,7 +21,7 @@ use crate::evidence::residuals::{Residuals, above};
 use crate::evidence::tonal;
 use crate::fit::blocked_recording::BlockedRecording;
 use crate::fit::force_residual::Estimator;
-use crate::fit::model::Model;
+use crate::laws::definition::Span;
 use crate::laws::{Effect, EffectName};
 use crate::propose::context::{FitContext, FittedModel};
 use crate::propose::excitation::Excitation;
@@ -36,20 +35,17 @@ fn resting(own: f64, unsure: f64, name: EffectName, standing: &[EffectName]) -> 
     if standing.contains(&name) { own } else { own.min(unsure) }
 }
 
+/// Part of the travel over which an effect gives way after a reversal, where that is more than
+/// bristles do: such a spring creeps.
+fn creeps(effect: &Effect, span: &Span) -> Option<f64> {
+    let part = effect.name.definition().gives_way_over(effect)? / span.travel();
+    (part > BRISTLES).then_some(part)
+}
+
 /// Weighs what the search found, and again without what is unsure as long as that makes the rest
 /// surer.
 pub(crate) fn weigh(scales: &Scales, found: StandingModel) -> WeighedModel {
-    let best = scales.without_unsure(scales.once(found, None));
-    if !best.stands_for_swing() || !best.materials.is_empty() {
-        return best;
-    }
-    // No model of the axis explains a force that ignores the axis.
-    let model = scales.context.fit_slow(Model::default(), &[&scales.null.noise]);
-    let materials = Vec::new();
-    let nothing = StandingModel { model, effects: Vec::new(), rejected: best.rejected, materials };
-    let refitted = scales.once(nothing, best.hertz);
-    let dropped = best.dropped.into_iter().chain(best.effects).collect();
-    WeighedModel { dropped, swing: best.swing, ..refitted }
+    scales.without_unsure(scales.once(found))
 }
 
 /// The context in which every model is weighed.
@@ -73,7 +69,7 @@ impl Scales<'_> {
         let mut standing =
             eliminate(model, self.context, self.holdout, &self.null.noise, noise, &best.materials);
         standing.rejected.splice(..0, best.rejected.iter().cloned());
-        self.once(standing, best.hertz)
+        self.once(standing)
     }
 
     fn without_unsure(&self, mut best: WeighedModel) -> WeighedModel {
@@ -99,8 +95,8 @@ impl Scales<'_> {
         }
     }
 
-    /// Weighs a model; `hertz` where the frequency of a swing is known from before.
-    fn once(&self, standing: StandingModel, hertz: Option<f64>) -> WeighedModel {
+    /// Weighs a model.
+    fn once(&self, standing: StandingModel) -> WeighedModel {
         let Self { context, refit, holdout, .. } = *self;
         let (StandingModel { model: slow, effects: found, rejected, materials }, patched) =
             self.against_rivals(standing);
@@ -108,7 +104,7 @@ impl Scales<'_> {
         let shown = Shown::new(context, &holdout.smoothed, &estimator, refit, patched);
         let left = self.left_over(&slow, &shown, &estimator);
         let Shown { on_fit, on_holdout, .. } = &shown;
-        let hertz = hertz.or_else(|| tonal::frequency(&estimator, &left_by(context.tracks, on_fit)));
+        let hertz = tonal::frequency(&estimator, &left_by(context.tracks, on_fit));
         let swing =
             hertz.and_then(|hertz| tonal::swing(&estimator, hertz, &left_by(&holdout.smoothed, on_holdout)));
         let repeats = self.repeats(&shown, &estimator);
@@ -129,7 +125,6 @@ impl Scales<'_> {
             materials,
             shown,
             estimator,
-            hertz,
             swing,
             repeats,
         }
@@ -282,7 +277,7 @@ struct LeftOver {
 }
 
 fn left_by<'a>(tracks: &'a [BlockedRecording], residuals: &'a Residuals) -> tonal::Left<'a> {
-    tonal::Left { tracks, force: &residuals.force, refit: &residuals.refit, patched: &residuals.patched }
+    tonal::Left { tracks, force: &residuals.force, refit: &residuals.refit }
 }
 
 #[cfg(test)]

@@ -9,7 +9,6 @@ pub(crate) mod choice;
 pub(crate) mod confidence;
 pub(crate) mod confidence_pass;
 pub(crate) mod contenders;
-pub(crate) mod contradictions;
 pub(crate) mod decision;
 pub(crate) mod decisive;
 pub(crate) mod diagnosis;

@@ -4,7 +4,7 @@
 use crate::data::rig::Kind;
 use crate::decide::material::Material;
 use crate::decide::thresholds::{
-    BEHIND_NATS, BEHIND_PART, BEHIND_SLOW_NATS, BEHIND_SLOW_Z, BEHIND_Z, LEADS_Z, MOST_IN_CLASS,
+    BEHIND_PART, BEHIND_SLOW_NATS, BEHIND_SLOW_Z, BEHIND_Z, LEADS_Z, MOST_IN_CLASS,
 };
 use crate::evidence::effect_evidence::{EffectEvidence, Rival};
 use crate::evidence::holdout_likelihood::evaluate_all;
@@ -178,7 +178,7 @@ pub(crate) fn class(
             class.push(twin);
         }
     }
-    let least = BEHIND_NATS.max(BEHIND_PART * (found.fit.sum + found.holdout.sum));
+    let least = BEHIND_PART * (found.fit.sum + found.holdout.sum);
     let is_near = |r: &&Rival| (r.z < BEHIND_Z || r.lead < least) && !r.is_absent;
     let mut near: Vec<&Rival> = found.rivals.iter().filter(is_near).collect();
     near.sort_by(|a, b| a.z.total_cmp(&b.z));

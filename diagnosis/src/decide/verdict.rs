@@ -2,9 +2,8 @@
 //! model.
 
 use crate::data::schema::Verdict;
-use crate::decide::contradictions::is_left_out;
 use crate::decide::diagnosis::Reason;
-use crate::decide::thresholds::{MATERIAL, UNDERSTOOD};
+use crate::decide::thresholds::{DOMINANT, MATERIAL, UNDERSTOOD};
 use crate::decide::weighed_model::WeighedModel;
 use crate::evidence::comparison::Shown;
 use crate::evidence::residual_maps::Map;
@@ -65,7 +64,7 @@ pub(crate) fn verdict(
     let again = weighed.repeats.filter(|_| disturbed);
     let swings = weighed
         .swing
-        .filter(|swing| disturbed && is_left_out(swing))
+        .filter(|swing| disturbed && swing.part > DOMINANT)
         .map(|swing| Reason::Swing { part: swing.part, hertz: swing.hertz });
     // What the noise of reading counts hides almost whole is no mismatch, whatever it resembles.
     let is_seen = weighed.floor < (1.0 - MATERIAL) * table.refit.holdout;

@@ -19,7 +19,6 @@ use crate::propose::comb;
 use crate::propose::context::{FitContext, FittedModel};
 use crate::propose::predictive::{left_out_costs, left_out_residuals, score_z};
 use numerics::bootstrap::{Gain, bootstrap};
-use std::ops::Range;
 
 /// Least part of a refit's mean square that counts as above the noise: the noise itself is not
 /// known exactly.
@@ -219,7 +218,7 @@ impl<'a> JudgedModel<'a> {
             Key::Term { effect, term } => *effect == i && definition.is_in_doubt_at_limit(*term),
             _ => false,
         });
-        is_bound || candidates::is_at_end(effect, self.context.span) || drifts_too_far(fit, i, effect.name)
+        is_bound || candidates::is_at_end(effect, self.context.span)
     }
 }
 
@@ -262,16 +261,4 @@ fn score_z_of(
     let both = left(with).into_iter().zip(left(without));
     both.map(|((with, paid), (without, before))| score_z(&with, &without, paid - before))
         .fold(f64::INFINITY, f64::min)
-}
-
-/// Parts of what it is at first that a dry friction may gain with time.
-const DRIFT: Range<f64> = -0.95..3.0;
-
-/// True if the dry friction changes more with time than warming explains.
-fn drifts_too_far(fit: &Fit, effect: usize, name: EffectName) -> bool {
-    let definition = name.definition();
-    let drifts = definition.drifts() && definition.needs_dry();
-    let dry = fit.value(Key::Coulomb).filter(|dry| drifts && *dry > 0.0);
-    let change = fit.value(Key::Term { effect, term: 0 });
-    dry.zip(change).is_some_and(|(dry, change)| !DRIFT.contains(&(change / dry)))
 }

@@ -31,18 +31,13 @@ pub(crate) struct TonalDisturbance {
     pub(crate) hertz: f64,
     /// Part of what the refit leaves that swings so.
     pub(crate) part: f64,
-    /// Part of what the refit leaves that swings so and that the effects found have taken on.
-    pub(crate) taken: f64,
-    /// Part of the rest, which does not swing so, that the effects found take.
-    pub(crate) taken_beside: f64,
 }
 
-/// The drive's force, and the residuals of the refitted and of the patched model.
+/// The drive's force, and the residual of the refitted model.
 pub(crate) struct Left<'a> {
     pub(crate) tracks: &'a [BlockedRecording],
     pub(crate) force: &'a [Vec<f64>],
     pub(crate) refit: &'a [Vec<f64>],
-    pub(crate) patched: &'a [Vec<f64>],
 }
 
 /// One recording's samples, evenly spaced.
@@ -147,7 +142,7 @@ fn nearby(hertz: f64, apart: f64, all: &[Samples]) -> f64 {
 /// is driven so.
 pub(crate) fn swing(estimator: &Estimator, hertz: f64, holdout: &Left) -> Option<TonalDisturbance> {
     let of_held = |signals: &[Vec<f64>]| samples(estimator, holdout.tracks, signals);
-    let (before, after) = (of_held(holdout.refit), of_held(holdout.patched));
+    let before = of_held(holdout.refit);
     // Each recorder has a clock of its own.
     let hertz = nearby(hertz, apart(&before), &before);
     let swings = explained(&before, hertz);
@@ -159,14 +154,7 @@ pub(crate) fn swing(estimator: &Estimator, hertz: f64, holdout: &Left) -> Option
     {
         return None;
     }
-    let still = explained(&after, hertz);
-    let beside = (whole - swings).max(1e-300);
-    Some(TonalDisturbance {
-        hertz,
-        part,
-        taken: (swings - still) / whole,
-        taken_beside: 1.0 - (square(&after) - still) / beside,
-    })
+    Some(TonalDisturbance { hertz, part })
 }
 
 #[cfg(test)]

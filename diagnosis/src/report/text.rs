@@ -42,18 +42,11 @@ pub(crate) fn rejection(why: &Rejection) -> String {
         }
         Rejection::AtLimit => "a fitted parameter reached its limit".into(),
         Rejection::NoSize => "its size cannot be distinguished from zero".into(),
-        Rejection::Swing { hertz } => {
-            format!("what it explains swings at {hertz:.1} Hz, whatever the axis does")
-        }
         Rejection::Creeps { part } => {
             format!("it would bend over {:.0} % of the travel, as a spring that creeps does", 100.0 * part)
         }
         Rejection::Rather(what) => rather(what),
         Rejection::BesideUnknown => "a larger effect in the same model is not in the library".into(),
-        Rejection::SameJoint { other } => format!("{} is of the same joint and explains more", other.in_words()),
-        Rejection::InertiaChanges => {
-            "gain and friction would change by the same part, as where the inertia changes".into()
-        }
         Rejection::Undecided => "more effects explain it as well than a class may hold".into(),
         Rejection::Improbable { probability, weakness: weakest } => {
             format!("it is right with a probability of only {probability:.2}: {}", weakness(weakest))
