@@ -8,17 +8,18 @@
 //!
 //! A diagnosis reads as its folders: `data` (rigs, recordings, the report's shape) is repaired
 //! (`repair`: faults of the logs), effects are proposed (`propose`: candidates and their shapes),
-//! judged (`evidence`: held-out recordings), and one is decided on (`pipeline`, which alone puts
-//! the stages one after another) and reported (`report`: sentences, pages and files). Below them
-//! are `laws` (the effects), `simulation` (a rig run forward) and `fit` (blocks, filter, noise).
-//! Each uses only those before it in the order of `tests/behaviour/layout.rs`, which checks this,
-//! and that no files use each other in a circle. The numbers that admit or reject a name are in
-//! `thresholds`, which every folder may read.
+//! measured (`evidence`: left-out and held-out stretches), decided on (`decide`: names, confidence
+//! and verdict, with every number that decides in `decide/thresholds`) and reported (`report`:
+//! sentences, pages and files). `pipeline` alone puts the stages one after another. Below them are
+//! `laws` (the effects), `simulation` (a rig run forward) and `fit` (blocks, filter, noise). Each
+//! uses only those before it in the order of `tests/behaviour/layout.rs`, which checks this, and
+//! that no files use each other in a circle.
 
 // Matrices are read by row and column.
 #![allow(clippy::needless_range_loop)]
 
 mod data;
+mod decide;
 mod evidence;
 mod fit;
 pub mod laws;
@@ -27,12 +28,11 @@ mod propose;
 mod repair;
 pub mod report;
 pub mod simulation;
-mod thresholds;
 
 pub use data::error::InputError;
 pub use data::{recording, rig};
+pub use decide::diagnosis::Series;
 pub use evidence::residual_maps::Map;
-pub use pipeline::diagnosis::Series;
 pub use report::outcome::{Evidence, Made, Outcome};
 pub use report::{DataFault, FaultKind, Report, Verdict};
 

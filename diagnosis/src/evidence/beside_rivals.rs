@@ -1,7 +1,7 @@
 //! Intervals that allow for an effect that is not named: what it would take of a named one.
 
 use crate::data::schema::Parameter;
-use crate::evidence::acceptance_criteria::Rival;
+use crate::evidence::effect_evidence::Rival;
 use crate::evidence::parameters::parameters;
 use crate::fit::noise::Colour;
 use crate::propose::context::{FitContext, FittedModel};

@@ -1,7 +1,6 @@
 //! The evidence for each effect of a fitted model, on left-out blocks of the fitted recordings and
 //! on held-out ones. Nothing here says what is enough to be named.
 
-use crate::evidence::acceptance_criteria::EffectEvidence;
 use crate::evidence::holdout_likelihood::{self, HoldoutFit, evaluate_all};
 use crate::evidence::holdout_set::HoldoutSet;
 use crate::evidence::parameters;
@@ -19,25 +18,74 @@ use crate::propose::candidates;
 use crate::propose::comb;
 use crate::propose::context::{FitContext, FittedModel};
 use crate::propose::predictive::{left_out_costs, left_out_residuals, score_z};
-use crate::thresholds::DRIFT;
-use numerics::bootstrap::bootstrap;
+use numerics::bootstrap::{Gain, bootstrap};
 
 /// Least part of a refit's mean square that counts as above the noise: the noise itself is not
 /// known exactly.
 const LEAST_EXPLAINABLE: f64 = 0.2;
 
-/// Gathers the evidence for each effect of a model fitted under white noise; the score is taken
-/// under `slow`.
+/// An effect as it came through the search, before it is judged.
+#[derive(Clone)]
+pub(crate) struct EffectEvidence {
+    pub(crate) effect: Effect,
+    /// The others fitted instead; empty before they are.
+    pub(crate) rivals: Vec<Rival>,
+    /// Held-out gain of the full model over the model without it.
+    pub(crate) holdout: Gain,
+    /// The same on blocks of the fitted recordings that were left out of its fit.
+    pub(crate) fit: Gain,
+    /// The reduction of the force residual on held-out recordings, over the square of the remaining
+    /// one.
+    pub(crate) force: Gain,
+    /// Standard errors of its gain under heavy-tailed noise by block, on left-out blocks of the
+    /// fitted or on held-out recordings, whichever are fewer; zero where it may be named without
+    /// it.
+    pub(crate) score_z: f64,
+    /// Part of the refit's residual above the sensor's noise that it explains, on fitted or on
+    /// held-out recordings.
+    pub(crate) share: f64,
+    /// Part of the held-out force error, root mean square, that it takes off.
+    pub(crate) off_force: f64,
+    /// True if one of its values is at a bound.
+    pub(crate) at_bound: bool,
+    /// True if its waves, if it has any, are those of teeth or poles.
+    pub(crate) is_comb: bool,
+    /// Size that it would have on each recording that plays it, over the size that it has on all,
+    /// fitted ones first; none where no fitted or no held-out one does.
+    pub(crate) sizes: Vec<f64>,
+}
+
+/// A rival and how far it is behind.
+#[derive(Clone, Debug)]
+pub(crate) struct Rival {
+    pub(crate) name: EffectName,
+    /// The effect with the shape that fits best.
+    pub(crate) effect: Effect,
+    /// Mean lead of the winner over its standard error, over all segments.
+    pub(crate) z: f64,
+    /// The same over the left-out stretches of the fitted recordings alone.
+    pub(crate) fit_z: f64,
+    /// Lead of the winner in log-likelihood, and how much of it is on held-out recordings.
+    pub(crate) lead: f64,
+    pub(crate) held_out_lead: f64,
+    /// True if its size may be zero, where it is near.
+    pub(crate) is_absent: bool,
+}
+
+/// Gathers the evidence for each effect of a model fitted under white noise. Where `asks_for_score`
+/// says so of the rest of the evidence, the score is taken under `slow`.
 pub(crate) fn gather_evidence(
     context: &FitContext,
     last: &FittedModel,
     slow: &Noise,
     holdout: &HoldoutSet,
+    asks_for_score: impl Fn(&EffectEvidence) -> bool,
 ) -> Vec<EffectEvidence> {
     let judging = holdout.judging(&last.model, context.span);
     let shown = holdout.shown(&last.model, context.span);
     let judged = JudgedModel::new(context, last, &judging, &shown);
-    (0..last.model.effects.len()).map(|i| judged.evidence(i, slow)).collect()
+    let one = |i| judged.evidence(i, slow, &asks_for_score);
+    (0..last.model.effects.len()).map(one).collect()
 }
 
 /// A model with what it leaves, to be compared with the model without one of its effects.
@@ -98,8 +146,13 @@ impl<'a> JudgedModel<'a> {
         }
     }
 
-    /// Gathers the evidence for effect `i`; the score is taken under `slow`.
-    fn evidence(&self, i: usize, slow: &Noise) -> EffectEvidence {
+    /// Gathers the evidence for effect `i`; the score is taken under `slow` if it is asked for.
+    fn evidence(
+        &self,
+        i: usize,
+        slow: &Noise,
+        asks_for_score: impl Fn(&EffectEvidence) -> bool,
+    ) -> EffectEvidence {
         let Self { context, last, judging, shown, estimator, left, .. } = self;
         let mut less = last.model.clone();
         let effect = less.effects.remove(i);
@@ -124,10 +177,9 @@ impl<'a> JudgedModel<'a> {
             at_bound: self.is_at_bound(&effect, i),
             is_comb: comb::is_comb(&effect, &last.fit.amplitudes(i)),
             sizes,
-            material: None,
             effect,
         };
-        if found.rejection().is_some() {
+        if asks_for_score(&found) {
             found.score_z = score_z_of(context, &last.model, &without.model, slow, judging);
         }
         found
@@ -166,7 +218,7 @@ impl<'a> JudgedModel<'a> {
             Key::Term { effect, term } => *effect == i && definition.is_in_doubt_at_limit(*term),
             _ => false,
         });
-        is_bound || candidates::is_at_end(effect, self.context.span) || drifts_too_far(fit, i, effect.name)
+        is_bound || candidates::is_at_end(effect, self.context.span)
     }
 }
 
@@ -209,13 +261,4 @@ fn score_z_of(
     let both = left(with).into_iter().zip(left(without));
     both.map(|((with, paid), (without, before))| score_z(&with, &without, paid - before))
         .fold(f64::INFINITY, f64::min)
-}
-
-/// True if the dry friction changes more with time than warming explains.
-fn drifts_too_far(fit: &Fit, effect: usize, name: EffectName) -> bool {
-    let definition = name.definition();
-    let drifts = definition.drifts() && definition.needs_dry();
-    let dry = fit.value(Key::Coulomb).filter(|dry| drifts && *dry > 0.0);
-    let change = fit.value(Key::Term { effect, term: 0 });
-    dry.zip(change).is_some_and(|(dry, change)| !DRIFT.contains(&(change / dry)))
 }

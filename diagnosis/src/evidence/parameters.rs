@@ -2,7 +2,6 @@
 //! contract's names.
 
 use crate::data::schema::Parameter;
-use crate::evidence::rejection::Rejection;
 use crate::fit::blocked_recording::BlockedRecording;
 use crate::fit::nominal::{Key, Nominal};
 use crate::laws::definition::{Fitted, NominalTerm, Reported};
@@ -109,12 +108,9 @@ fn sizes(name: N, parameters: &BTreeMap<String, Parameter>) -> impl Iterator<Ite
     parameters.iter().filter(move |(key, _)| name.definition().is_size(key)).map(|(_, p)| p)
 }
 
-/// Returns why an effect of a fitted model may not be named although it explains something: its own
-/// size may be zero.
-pub(crate) fn absence(context: &FitContext, fitted: &FittedModel, effect: usize) -> Option<Rejection> {
-    let name = fitted.model.effects[effect].name;
-    let is_there = is_there(name, &parameters(context, fitted, effect));
-    (!is_there).then_some(Rejection::NoSize)
+/// True if the size of an effect of a fitted model may be zero.
+pub(crate) fn is_absent(context: &FitContext, fitted: &FittedModel, effect: usize) -> bool {
+    !is_there(fitted.model.effects[effect].name, &parameters(context, fitted, effect))
 }
 
 /// The coefficients of an effect of a fitted model with their standard deviations, and their

@@ -4,7 +4,6 @@
 
 use crate::fit::blocked_recording::BlockedRecording;
 use crate::fit::force_residual::Estimator;
-use crate::thresholds::MISTAKEN;
 use numerics::golden_section::golden;
 use numerics::parallel;
 use std::f64::consts::TAU;
@@ -32,36 +31,13 @@ pub(crate) struct TonalDisturbance {
     pub(crate) hertz: f64,
     /// Part of what the refit leaves that swings so.
     pub(crate) part: f64,
-    /// Part of what the refit leaves that swings so and that the effects found have taken on.
-    pub(crate) taken: f64,
-    /// Part of the rest, which does not swing so, that the effects found take.
-    pub(crate) taken_beside: f64,
 }
 
-/// The smallest part at which a swing is the missing physics.
-const DOMINANT: f64 = 0.4;
-/// Part of the rest from which effects explain more than a swing: a delay leaves much where its
-/// command has a tone, and something everywhere else.
-const MORE_THAN_SWING: f64 = 0.3;
-
-impl TonalDisturbance {
-    /// True if the effects found explain a swing and little else.
-    pub(crate) fn is_mistaken(&self) -> bool {
-        self.taken > MISTAKEN && self.taken_beside < MORE_THAN_SWING
-    }
-
-    /// True if the swing is what was left out.
-    pub(crate) fn is_left_out(&self) -> bool {
-        self.part > DOMINANT || self.is_mistaken()
-    }
-}
-
-/// The drive's force, and the residuals of the refitted and of the patched model.
+/// The drive's force, and the residual of the refitted model.
 pub(crate) struct Left<'a> {
     pub(crate) tracks: &'a [BlockedRecording],
     pub(crate) force: &'a [Vec<f64>],
     pub(crate) refit: &'a [Vec<f64>],
-    pub(crate) patched: &'a [Vec<f64>],
 }
 
 /// One recording's samples, evenly spaced.
@@ -166,7 +142,7 @@ fn nearby(hertz: f64, apart: f64, all: &[Samples]) -> f64 {
 /// is driven so.
 pub(crate) fn swing(estimator: &Estimator, hertz: f64, holdout: &Left) -> Option<TonalDisturbance> {
     let of_held = |signals: &[Vec<f64>]| samples(estimator, holdout.tracks, signals);
-    let (before, after) = (of_held(holdout.refit), of_held(holdout.patched));
+    let before = of_held(holdout.refit);
     // Each recorder has a clock of its own.
     let hertz = nearby(hertz, apart(&before), &before);
     let swings = explained(&before, hertz);
@@ -178,14 +154,7 @@ pub(crate) fn swing(estimator: &Estimator, hertz: f64, holdout: &Left) -> Option
     {
         return None;
     }
-    let still = explained(&after, hertz);
-    let beside = (whole - swings).max(1e-300);
-    Some(TonalDisturbance {
-        hertz,
-        part,
-        taken: (swings - still) / whole,
-        taken_beside: 1.0 - (square(&after) - still) / beside,
-    })
+    Some(TonalDisturbance { hertz, part })
 }
 
 #[cfg(test)]

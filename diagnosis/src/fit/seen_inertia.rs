@@ -11,11 +11,12 @@ use crate::fit::force_residual::Estimator;
 use crate::fit::linear_fit::Fit;
 use crate::fit::model::Model;
 use crate::fit::nominal::{Kept, Nominal};
-use crate::thresholds::MATERIAL;
 use numerics::linear::{Prior, Square, bounded};
 
 /// Factor by which a gain over inertia that is hardly known may differ from the rig's.
 const REACH: f64 = 40.0;
+/// Part of the force error that a found inertia must take off to be kept instead of the rig's.
+const MATERIAL: f64 = 0.05;
 /// Relative standard deviation of a gain over inertia that was found.
 const FOUND: f64 = 0.3;
 

@@ -1,44 +1,28 @@
 //! The stages of a diagnosis, one after another: this folder alone sequences them.
 //!
-//! [`prepare`] cuts rig and recordings into blocks and refits the nominal model; [`search`] adds
-//! and removes effects by the filter, [`proposals`] asks the regression and [`by_regression`]
-//! fits what that names; [`assess`] weighs the effects of either; [`decide`] names those of one of
-//! them, or says why nothing is named. Each stage is one function that takes what the one before it
-//! returns, and changes none of it. The result is a [`diagnosis::Diagnosis`].
+//! [`prepare`] cuts rig and recordings into blocks and refits the nominal model; [`proposals`] asks
+//! the regression and [`search`] adds effects by the filter; `decide::choice` weighs the effects of
+//! either and takes one of the two models; `decide::decision` names its effects, or says why
+//! nothing is named. Each stage is one function that takes what the one before it returns, and
+//! changes none of it. The result is a [`Diagnosis`].
 
-mod assess;
-mod by_regression;
-pub(crate) mod check;
-mod contenders;
-mod decide;
-pub(crate) mod decisive;
-pub(crate) mod diagnosis;
-mod evidence;
-pub(crate) mod evidence_table;
-mod law_band;
-mod patched_rig;
 mod prepare;
 mod proposals;
-mod run_forward;
 mod search;
-mod verdict;
 
 use crate::data::error::InputError;
 use crate::data::recording::Recording;
 use crate::data::rig::Rig;
 use crate::data::sufficiency;
-use crate::evidence::residuals::above;
+use crate::decide::choice::assessed;
+use crate::decide::decision;
+use crate::decide::diagnosis::{Diagnosis, Reason};
+use crate::decide::elimination::Found;
+use crate::evidence::check::{self, Check};
+use crate::evidence::prepared::Prepared;
 use crate::fit::{plausibility, skew};
 use crate::propose::context::FittedModel;
 use crate::repair::Checked;
-use crate::thresholds::CLEARLY_LESS;
-use assess::Assessment;
-use by_regression::by_regression;
-use check::Check;
-use diagnosis::{Diagnosis, Reason};
-use prepare::Prepared;
-use regression::Hypothesis;
-use search::Found;
 
 /// A callback that receives the stage and the fraction done.
 pub(crate) type Progress<'a> = &'a (dyn Fn(&str, f64) + Sync);
@@ -101,7 +85,7 @@ pub(crate) fn run(
     progress("writing down", 0.95);
     let rate_hz = all.iter().map(|recording| recording.rate_hz()).min_by(f64::total_cmp);
     let diagnosis = match assessed {
-        Ok(assessment) => decide::decide(&prepared, &assessment, &rounds, holdout, rate_hz),
+        Ok(assessment) => decision::decide(&prepared, &assessment, &rounds, holdout, rate_hz),
         Err(reason) => Diagnosis::CannotTell { rig: Box::new(prepared.nominal.rig.clone()), reason, rate_hz },
     };
     Ok((diagnosis, Some(check)))
@@ -115,45 +99,6 @@ fn hidden_skew(prepared: &Prepared, found: &Found) -> Option<f64> {
     }
     let FittedModel { model, noise, .. } = &found.standing.model;
     skew::hidden(model, &prepared.nominal, &found.fit, noise, prepared.scale)
-}
-
-/// Assesses what the regression names and what the filter found, and takes one of the two.
-fn assessed(prepared: &Prepared, found: Found, rounds: &[Vec<Hypothesis>]) -> Result<Assessment, Reason> {
-    let by_regression = by_regression(prepared, &found, rounds);
-    let by_regression = by_regression.and_then(|found| assess::assess(prepared, found).ok());
-    let by_filter = assess::assess(prepared, found);
-    let by_regression = by_regression.filter(|one| !one.weighed.named().is_empty() && lowers_error(one));
-    match (by_regression, by_filter) {
-        (Some(one), Ok(other)) if !is_taken(&one, &other) => Ok(other),
-        (Some(mut one), Ok(other)) => {
-            one.weighed.is_beside(&other.weighed);
-            Ok(one)
-        }
-        (Some(one), Err(_)) => Ok(one),
-        (None, by_filter) => by_filter,
-    }
-}
-
-/// True if the model of the regression's names is taken and not what the filter found: it is unless
-/// the other leaves clearly less of the force error of the fitted recordings, above the noise of
-/// reading whole counts. Held-out recordings choose nothing.
-fn is_taken(by_regression: &Assessment, by_filter: &Assessment) -> bool {
-    let left = |one: &Assessment| {
-        let table = one.table();
-        let above_noise = |rms: f64| above(rms, one.weighed.floor, 0.0);
-        above_noise(table.patched.fit) / above_noise(table.refit.fit).max(1e-300)
-    };
-    match &by_filter.foreign {
-        // Physics without a name that is sure is kept where it leaves as little.
-        Some(foreign) => 1.0 - foreign.share >= left(by_regression),
-        None if by_filter.weighed.named().is_empty() => true,
-        None => left(by_filter) >= CLEARLY_LESS.powi(2) * left(by_regression),
-    }
-}
-
-/// True if the named effects together take a material part off the held-out force error.
-fn lowers_error(one: &Assessment) -> bool {
-    assess::is_material(one.table())
 }
 
 /// Why a recording cannot be used, as where a unit or a sign is wrong, with those that still could;

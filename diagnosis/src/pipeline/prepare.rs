@@ -3,8 +3,9 @@
 
 use super::Progress;
 use crate::data::recording::Recording;
-use crate::data::rig::{Kind, Rig};
+use crate::data::rig::Rig;
 use crate::evidence::holdout_set::HoldoutSet;
+use crate::evidence::prepared::Prepared;
 use crate::evidence::residuals::{drive_force, forces};
 use crate::fit::blocked_recording::{BlockedRecording, Jumps};
 use crate::fit::filter::Noise;
@@ -15,45 +16,10 @@ use crate::fit::model::Model;
 use crate::fit::noise::{self, Colour};
 use crate::fit::nominal::Nominal;
 use crate::fit::{quasi_static, refit, skew};
-use crate::laws::definition::{Shown, Span};
 use crate::laws::{Effect, EffectName};
 use crate::propose::candidates::span_of;
-use crate::propose::context::{FitContext, FittedModel};
-use crate::propose::excitation::Excitation;
+use crate::propose::context::FittedModel;
 use crate::repair::Checked;
-
-/// Rig and recordings before any effect is looked for.
-pub(crate) struct Prepared {
-    /// The rig as it was given.
-    pub(crate) given: Rig,
-    pub(crate) nominal: Nominal,
-    /// The recordings that are fitted, in the motion of the refitted nominal model.
-    pub(crate) fit: Vec<BlockedRecording>,
-    /// The recordings that judge.
-    pub(crate) holdout: HoldoutSet,
-    pub(crate) span: Span,
-    /// Acceleration that the command makes: the scale of the noise search.
-    pub(crate) scale: f64,
-    /// Noise under the refitted nominal model.
-    pub(crate) noise: Noise,
-    /// Laws of the command that the force which the motion asks for does not show.
-    pub(crate) unsought: Vec<EffectName>,
-}
-
-impl Prepared {
-    /// Returns the context of a search over recordings in some motion.
-    pub(crate) fn context<'a>(&'a self, tracks: &'a [BlockedRecording]) -> FitContext<'a> {
-        let Self { nominal, span, scale, unsought, .. } = self;
-        FitContext { nominal, tracks, span, scale: *scale, unsought }
-    }
-
-    /// The facts about the axis that recordings in some motion show.
-    pub(crate) fn shown(&self, tracks: &[BlockedRecording]) -> Shown {
-        let (count, rig) = (self.span.count, &self.nominal.rig);
-        let excitation = Excitation::of(tracks, count, rig.turn()).shown();
-        Shown { one_way: self.span.one_way, linear: rig.kind == Kind::Linear, count, ..excitation }
-    }
-}
 
 /// Cuts recordings into blocks, refits the nominal model, and looks for lost counts; `skew_rows`
 /// are the rows by which commands act late, where that is known.

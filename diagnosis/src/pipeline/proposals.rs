@@ -1,12 +1,12 @@
 //! The regression's proposals: rig and recordings as it reads them, and no opinion.
 
-use super::prepare::Prepared;
 use crate::data::recording::Recording;
 use crate::data::rig::{Kind, Rig};
+use crate::decide::thresholds::FOLLOWS_SHARE;
+use crate::evidence::prepared::Prepared;
 use crate::fit::skew;
 use crate::laws::EffectName;
 use crate::repair::Checked;
-use crate::thresholds::FOLLOWS_SHARE;
 use regression::laws::{ActsOn, Law};
 use regression::{Hypothesis, Part, Value};
 

@@ -3,24 +3,23 @@
 //! are chosen: they take out what does not carry to them, and choose nothing.
 
 use super::Progress;
-use super::prepare::Prepared;
-use crate::evidence::effect_evidence::gather_evidence;
-use crate::evidence::elimination::{RejectedHypothesis, StandingModel, eliminate};
+use crate::decide::acceptance_criteria::gather_evidence;
+use crate::decide::elimination::{Found, RejectedHypothesis, eliminate};
+use crate::decide::rejection::Rejection;
+use crate::decide::thresholds::MIN_LOG_LIKELIHOOD_GAIN;
 use crate::evidence::holdout_set::HoldoutSet;
 use crate::evidence::parameters;
-use crate::evidence::rejection::Rejection;
+use crate::evidence::prepared::Prepared;
 use crate::evidence::residuals::forces;
 use crate::fit::blocked_recording::BlockedRecording;
 use crate::fit::force_residual::Estimator;
 use crate::fit::model::Model;
 use crate::fit::noise::Colour;
-use crate::fit::refit;
-use crate::fit::smoother::Knows;
 use crate::laws::{Effect, EffectName};
+use crate::propose::candidates;
 use crate::propose::context::{FitContext, FittedModel, MOST};
+use crate::propose::joint::in_its_own_motion;
 use crate::propose::predictive::left_out_costs;
-use crate::propose::{candidates, joint};
-use crate::thresholds::MIN_LOG_LIKELIHOOD_GAIN;
 use numerics::parallel;
 use std::cell::Cell;
 
@@ -34,17 +33,6 @@ const SEARCHED: f64 = 0.85;
 const STEP: f64 = 0.15;
 /// The stage that people see.
 const SEARCHING: &str = "searching for what was left out";
-
-/// The result of the search.
-pub(crate) struct Found {
-    /// The fitted recordings in the motion of the model that was found.
-    pub(crate) fit: Vec<BlockedRecording>,
-    /// The recordings that judge, in that motion.
-    pub(crate) holdout: HoldoutSet,
-    /// The null under coloured noise.
-    pub(crate) null: FittedModel,
-    pub(crate) standing: StandingModel,
-}
 
 /// Searches for the effects that explain what the nominal model leaves.
 pub(crate) fn search(prepared: &Prepared, progress: Progress) -> Found {
@@ -202,7 +190,9 @@ impl Search<'_> {
         let judged =
             gather_evidence(&own, &white, &with.noise, &judging).pop().expect("the last effect is judged");
         let last = white.model.effects.len() - 1;
-        let rejection = judged.rejection_in_search().or_else(|| parameters::absence(&own, &white, last));
+        let rejection = judged.rejection_in_search();
+        let is_absent = || parameters::is_absent(&own, &white, last).then_some(Rejection::NoSize);
+        let rejection = rejection.or_else(is_absent);
         let is_kept = rejection.is_none() || (may_promise && judged.is_provisional());
         let slow = is_kept.then(|| own.fit_slow(white.model.clone(), &[&with.noise, &white.noise]));
         let state = slow.map(|slow| SearchState { white, slow, tracks, judging });
@@ -232,7 +222,7 @@ impl Search<'_> {
             let judging = self.followed(&now.judging, &white);
             let slow = own.fit_slow(white.model.clone(), &[&now.slow.noise, &white.noise]);
             let judged = gather_evidence(&own, &white, &slow.noise, &judging);
-            let is_there = |place: usize| parameters::absence(&own, &white, place).is_none();
+            let is_there = |place: usize| !parameters::is_absent(&own, &white, place);
             if judged.iter().all(|judged| judged.rejection().is_none()) && (0..judged.len()).all(is_there) {
                 let state = SearchState { white, slow, tracks, judging };
                 return Some(Next { state, generalises: true });
@@ -300,23 +290,6 @@ fn best_plain_models(on: &FitContext, now: &SearchState) -> Vec<FittedModel> {
     }
     fitted.sort_by(|a, b| b.merit.total_cmp(&a.merit));
     fitted
-}
-
-/// Fitted recordings smoothed with a model fitted to them, and the model fitted again: what a null
-/// leaves out is noise to its smoother, and next to rest and reversals such a smoother knows
-/// neither the speed nor its sign.
-pub(super) fn in_its_own_motion(
-    tracks: &[BlockedRecording],
-    candidate: FittedModel,
-    on: &FitContext,
-) -> (Vec<BlockedRecording>, FittedModel) {
-    let mut own = tracks.to_vec();
-    let count = 1.0 / on.nominal.rig.encoder.counts_per_unit;
-    refit::estimate_motion(&mut own, &candidate.fit.totals(tracks), &candidate.noise, count, Knows::All);
-    let context = FitContext { tracks: &own, ..*on };
-    let again = context.fit(candidate.model, &candidate.noise, Colour::White);
-    let again = joint::settled(&context, again);
-    (own, again)
 }
 
 /// Candidates whose gain is this part of the best one's are near ties.

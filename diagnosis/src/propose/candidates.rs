@@ -6,7 +6,6 @@ use crate::fit::blocked_recording::BlockedRecording;
 use crate::fit::nominal::Nominal;
 use crate::laws::definition::{Believed, Movable, NominalTerm, Span};
 use crate::laws::{Effect, EffectName as N};
-use crate::thresholds::{AT_END, BRISTLES};
 use numerics::linear::correlation;
 use std::f64::consts::TAU;
 
@@ -153,6 +152,9 @@ pub(crate) fn movable(effect: &Effect, span: &Span) -> Vec<Movable> {
     effect.name.definition().movable(effect, span)
 }
 
+/// A value within this part of a bound counts as at the bound.
+const AT_END: f64 = 0.05;
+
 /// True if a drift is at the end of what may be distinguished from something else: what settles at
 /// once cannot be distinguished from how a recording begins, and what has hardly begun at its end
 /// is any slow change.
@@ -162,13 +164,6 @@ pub(crate) fn is_at_end(effect: &Effect, span: &Span) -> bool {
             let value = effect.shape[*key];
             value < low * (1.0 + AT_END) || value > high * (1.0 - AT_END)
         })
-}
-
-/// Part of the travel over which an effect gives way after a reversal, where that is more than
-/// bristles do: such a spring creeps.
-pub(crate) fn creeps(effect: &Effect, span: &Span) -> Option<f64> {
-    let part = effect.name.definition().gives_way_over(effect)? / span.travel();
-    (part > BRISTLES).then_some(part)
 }
 
 #[cfg(test)]
@@ -342,9 +337,6 @@ mod tests {
             assert!(at_end(name, 1.0) && at_end(name, 250.0));
             assert!(!at_end(name, 2.0) && !at_end(name, 15.0) && !at_end(name, 100.0));
         }
-        let bristles =
-            |deflection| creeps(&Effect::shaped(N::PreslidingFriction, &[("deflection", deflection)]), &span);
-        assert_eq!((bristles(1e-3), bristles(0.3), bristles(2.0)), (None, None, Some(0.1)));
         let grip = |limit, coast| {
             let shape =
                 [("limit", limit), ("coast", coast), ("per_command", -10.0), ("dry", 5.0), ("ratio", 1.0)];

@@ -2,10 +2,13 @@
 //! many optima, and lean on the rest of the machine. What is here moves shapes; it chooses between
 //! no effects.
 
+use crate::fit::blocked_recording::BlockedRecording;
 use crate::fit::filter::Noise;
 use crate::fit::linear_fit::Fit;
 use crate::fit::model::Model;
 use crate::fit::noise::Colour;
+use crate::fit::refit;
+use crate::fit::smoother::Knows;
 use crate::laws::{Effect, WholeMachine};
 use crate::propose::candidates;
 use crate::propose::context::{FitContext, FittedModel};
@@ -118,4 +121,21 @@ pub(crate) fn settled(context: &FitContext, candidate: FittedModel) -> FittedMod
     let found = (merit(&candidate.model), candidate.model.clone());
     let (_, model) = settle(context, found, &candidate.noise, &merit);
     context.fit(model, &candidate.noise, Colour::White)
+}
+
+/// Fitted recordings smoothed with a model fitted to them, and the model fitted again: what a null
+/// leaves out is noise to its smoother, and next to rest and reversals such a smoother knows
+/// neither the speed nor its sign.
+pub(crate) fn in_its_own_motion(
+    tracks: &[BlockedRecording],
+    candidate: FittedModel,
+    on: &FitContext,
+) -> (Vec<BlockedRecording>, FittedModel) {
+    let mut own = tracks.to_vec();
+    let count = 1.0 / on.nominal.rig.encoder.counts_per_unit;
+    refit::estimate_motion(&mut own, &candidate.fit.totals(tracks), &candidate.noise, count, Knows::All);
+    let context = FitContext { tracks: &own, ..*on };
+    let again = context.fit(candidate.model, &candidate.noise, Colour::White);
+    let again = settled(&context, again);
+    (own, again)
 }

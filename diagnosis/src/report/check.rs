@@ -1,7 +1,7 @@
 //! A check of recordings in sentences.
 
 use super::{faults, next_experiment, text};
-use crate::pipeline::check::Check;
+use crate::evidence::check::Check;
 use numerics::digits::in_sentence;
 
 /// The sentences, one a line, the recordings first and what to record last.

@@ -1,6 +1,6 @@
 //! The decisive plot, on top of the page.
 
-use crate::pipeline::decisive::{Bin, Decisive, RivalLaw};
+use crate::decide::decisive::{Bin, Decisive, RivalLaw};
 use crate::report::outcome::Outcome;
 use html_report::drawing::path;
 use html_report::plot::{close, frame};

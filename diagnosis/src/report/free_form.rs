@@ -2,8 +2,8 @@
 
 use crate::data::rig::Kind;
 use crate::data::schema::FreeForm;
+use crate::decide::diagnosis::FreeForce;
 use crate::laws::Variable;
-use crate::pipeline::diagnosis::FreeForce;
 use crate::propose::free_form::Shape;
 use crate::report::form_in_words;
 use html_report::drawing::path;

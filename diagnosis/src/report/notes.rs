@@ -1,7 +1,7 @@
 //! Notes that a reader has to know: commands that act early or late, an inertia far from the rig's,
 //! and what a log alone cannot distinguish from a name.
 
-use crate::pipeline::diagnosis::{Moved, NamedEffect};
+use crate::decide::diagnosis::{Moved, NamedEffect};
 
 /// Standard deviations from the rig's value at which a value is reported as far from it.
 const FAR: f64 = 2.0;

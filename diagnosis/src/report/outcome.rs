@@ -2,13 +2,13 @@
 
 use crate::data::rig::{Kind, Rig};
 use crate::data::schema::{Both, Contending, FitTable, Hypothesis, Named, Report, Untested, Verdict};
-use crate::evidence::residual_maps::Map;
-use crate::laws::EffectName;
-use crate::pipeline::decisive::Decisive;
-use crate::pipeline::diagnosis::{
+use crate::decide::decisive::Decisive;
+use crate::decide::diagnosis::{
     Complete, Contender, Diagnosis, JudgedHypothesis, NamedEffect, Reason, Rigs, Series,
 };
-use crate::pipeline::evidence_table::{self, EvidenceRow};
+use crate::decide::evidence_table::{self, EvidenceRow};
+use crate::evidence::residual_maps::Map;
+use crate::laws::EffectName;
 use crate::propose::free_form::Shape;
 use crate::report::{free_form, next_experiment, notes, remains, text};
 use crate::simulation::comparison::Comparison;

@@ -2,7 +2,7 @@
 //! to record next.
 
 use crate::data::schema::{Report, Verdict};
-use crate::thresholds::UNDERSTOOD;
+use crate::decide::thresholds::UNDERSTOOD;
 
 /// The residual over the sensor's noise from which there is more to be found, and below which there
 /// is nothing.
@@ -87,7 +87,7 @@ mod tests {
     use super::*;
     use crate::data::rig::Rig;
     use crate::data::schema::Both;
-    use crate::pipeline::diagnosis::Reason;
+    use crate::decide::diagnosis::Reason;
     use crate::report::outcome::Outcome;
 
     /// A report whose patched model leaves 5 % of a force of 1 over a sensor's noise.

@@ -1,7 +1,7 @@
 //! Plots of the place of the residual: over time and over states.
 
+use crate::decide::diagnosis::Series;
 use crate::evidence::residual_maps::Map;
-use crate::pipeline::diagnosis::Series;
 use crate::report::motion_picture::COLUMNS;
 use crate::report::outcome::Outcome;
 use html_report::drawing::{path, thinned};

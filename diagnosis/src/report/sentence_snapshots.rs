@@ -3,8 +3,8 @@
 
 use crate::data::rig::{Kind, Rig};
 use crate::data::schema::{Both, Named, Place, Region, Report, Verdict};
+use crate::decide::diagnosis::Reason;
 use crate::laws::EffectName as N;
-use crate::pipeline::diagnosis::Reason;
 use crate::report::outcome::{Outcome, sentence};
 use std::collections::BTreeMap;
 

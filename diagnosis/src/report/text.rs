@@ -1,10 +1,10 @@
 //! The clauses of a report that say why an effect is not named, and why nothing is; `outcome` makes
 //! the headline. Nothing reads one to decide.
 
-use crate::evidence::rejection::{Rather, Rejection, Weakness};
-use crate::pipeline::diagnosis::Reason;
+use crate::decide::diagnosis::Reason;
+use crate::decide::rejection::{Rather, Rejection, Weakness};
+use crate::decide::thresholds::{CERTAIN_Z, LEAST_SHARE, MATERIAL, SURE_Z, UNLIKELY_Z, UNSURE_SHARE};
 use crate::propose::untested::NotTested;
-use crate::thresholds::{CERTAIN_Z, LEAST_SHARE, MATERIAL, SURE_Z, UNLIKELY_Z, UNSURE_SHARE};
 use numerics::bootstrap::Gain;
 use numerics::digits::short;
 
@@ -42,18 +42,11 @@ pub(crate) fn rejection(why: &Rejection) -> String {
         }
         Rejection::AtLimit => "a fitted parameter reached its limit".into(),
         Rejection::NoSize => "its size cannot be distinguished from zero".into(),
-        Rejection::Swing { hertz } => {
-            format!("what it explains swings at {hertz:.1} Hz, whatever the axis does")
-        }
         Rejection::Creeps { part } => {
             format!("it would bend over {:.0} % of the travel, as a spring that creeps does", 100.0 * part)
         }
         Rejection::Rather(what) => rather(what),
         Rejection::BesideUnknown => "a larger effect in the same model is not in the library".into(),
-        Rejection::SameJoint { other } => format!("{} is of the same joint and explains more", other.in_words()),
-        Rejection::InertiaChanges => {
-            "gain and friction would change by the same part, as where the inertia changes".into()
-        }
         Rejection::Undecided => "more effects explain it as well than a class may hold".into(),
         Rejection::Improbable { probability, weakness: weakest } => {
             format!("it is right with a probability of only {probability:.2}: {}", weakness(weakest))

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 
 /// Folders from the bottom to the top. Folders are counted, not files as in the small crates of
 /// host-sim: an arrow within a folder stays within its subject.
-const FLOORS: [&str; 9] =
-    ["laws", "data", "simulation", "repair", "fit", "propose", "evidence", "pipeline", "report"];
+const FLOORS: [&str; 10] =
+    ["laws", "data", "simulation", "repair", "fit", "propose", "evidence", "decide", "report", "pipeline"];
 
 fn sources(dir: &Path, out: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(dir).expect("the folder is there") {
@@ -65,20 +65,14 @@ fn each_folder_uses_only_those_before_it() {
     assert!(upward.is_empty(), "folders use those above them:\n{}", upward.join("\n"));
 }
 
-/// Files outside the folders: the crate's root, and the numbers that decide, which every folder may
-/// read and which use none.
-const BESIDE: [&str; 2] = ["lib.rs", "thresholds.rs"];
-
 #[test]
-fn only_thresholds_is_next_to_the_folders() {
+fn only_the_root_is_next_to_the_folders() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
     for entry in fs::read_dir(&root).expect("the folder is there") {
         let name = entry.expect("its entries can be read").file_name();
         let name = name.to_string_lossy();
-        assert!(BESIDE.contains(&&*name) || FLOORS.contains(&&*name), "{name} is in no folder");
+        assert!(name == "lib.rs" || FLOORS.contains(&&*name), "{name} is in no folder");
     }
-    let thresholds = fs::read_to_string(root.join("thresholds.rs")).expect("a source can be read");
-    assert!(thresholds.lines().all(|line| named(line).is_empty()), "the numbers that decide use a folder");
 }
 
 /// The code outside `laws/` that may name effects, and why. Facts about an effect belong into
@@ -167,6 +161,67 @@ fn the_definition_of_an_effect_is_in_its_file() {
     assert!(wrong.is_empty(), "code outside laws/ names effects:\n{}", wrong.join("\n"));
     for (file, why) in MAY_NAME {
         assert!(naming.iter().any(|(name, _)| name == file), "{file} names no effect, and need not ({why})");
+    }
+}
+
+/// The numbers in the code of a folder that are not 0, 1/2, 1 or 2: how many it holds, which may
+/// only fall, and how many are wanted (issue 69).
+const NUMBERS: [(&str, usize, Option<usize>); 3] =
+    [("propose", 116, Some(30)), ("evidence", 56, None), ("decide", 86, Some(15))];
+
+/// The numbers that a line of code spells, without those within words and strings.
+fn numbers(line: &str) -> Vec<f64> {
+    let code = line.split("//").next().unwrap_or("");
+    let outside: String = code.split('"').step_by(2).collect::<Vec<_>>().join(" ");
+    let is_word = |c: char| c.is_alphanumeric() || c == '_';
+    let mut out = Vec::new();
+    let mut before = ' ';
+    let mut rest = outside.as_str();
+    while let Some(first) = rest.chars().next() {
+        let length = if first.is_ascii_digit() && !is_word(before) {
+            let word = |(i, c): (usize, char)| {
+                let is_point = c == '.' && rest[i + 1..].starts_with(|c: char| c.is_ascii_digit());
+                let is_sign = c == '-' && rest[..i].ends_with('e');
+                !(is_word(c) || is_point || is_sign)
+            };
+            let end = rest.char_indices().find(|at| word(*at)).map_or(rest.len(), |(i, _)| i);
+            let digits = rest[..end].replace('_', "");
+            let digits = digits.trim_end_matches("f64").trim_end_matches("usize").trim_end_matches("u64");
+            out.extend(digits.parse::<f64>());
+            end
+        } else {
+            first.len_utf8()
+        };
+        before = rest[..length].chars().next_back().unwrap_or(' ');
+        rest = &rest[length..];
+    }
+    out
+}
+
+#[test]
+fn a_number_in_code_is_seen() {
+    assert_eq!(numbers("a.0 < 0.35 * x1[3] + 1e-3 // 7"), [0.0, 0.35, 3.0, 1e-3]);
+    assert_eq!(numbers("(0..24).map(f64::sqrt, \"8\") + 1_000_u64"), [0.0, 24.0, 1000.0]);
+}
+
+#[test]
+fn no_folder_holds_more_numbers_than_before() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    for (folder, most, wanted) in NUMBERS {
+        let mut files = Vec::new();
+        sources(&root.join(folder), &mut files);
+        let text = |file: &PathBuf| fs::read_to_string(file).expect("a source can be read");
+        let tests: Vec<PathBuf> = files
+            .iter()
+            .flat_map(|file| without_tests(&text(file)).1.into_iter().map(|test| below(file, &test)))
+            .collect();
+        let count = |file: &PathBuf| -> usize {
+            let is_free = |number: &f64| [0.0, 0.5, 1.0, 2.0].contains(number);
+            without_tests(&text(file)).0.iter().flat_map(|line| numbers(line)).filter(|n| !is_free(n)).count()
+        };
+        let all: usize = files.iter().filter(|file| !tests.contains(file)).map(count).sum();
+        let note = "a number more needs one less elsewhere; one less is written here";
+        assert_eq!(all, most, "{folder} holds {all} numbers, not {most} ({wanted:?} are wanted): {note}");
     }
 }
 

@@ -7,6 +7,8 @@ mod evaluate;
 mod shape;
 
 pub(crate) use basis::Inputs;
-pub(crate) use compare::{Taken, is_told};
+#[cfg(test)]
+pub(crate) use compare::Density;
+pub(crate) use compare::{Densities, Gain, Taken};
 pub(crate) use evaluate::Evaluator;
 pub(crate) use shape::Shape;

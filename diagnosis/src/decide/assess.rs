@@ -1,24 +1,24 @@
 //! The fourth stage: how sure each effect is, and whether something without a name explains the
 //! recordings instead.
 
-use super::diagnosis::Reason;
-use super::prepare::Prepared;
-use super::search::Found;
-use super::verdict::misfit;
 use crate::data::schema::FitTable;
+use crate::decide::confidence_pass::{Scales, weigh};
+use crate::decide::diagnosis::Reason;
+use crate::decide::elimination::Found;
+use crate::decide::free_form_check::{self, FreeFormShare, Unnamed};
+use crate::decide::out_of_library::{self, Foreign};
+use crate::decide::thresholds::MATERIAL;
+use crate::decide::verdict::misfit;
+use crate::decide::weighed_model::WeighedModel;
 use crate::evidence::comparison::Shown;
-use crate::evidence::confidence_pass::{Scales, weigh};
-use crate::evidence::free_form_check::{self, FreeFormShare, Unnamed};
 use crate::evidence::holdout_set::HoldoutSet;
-use crate::evidence::out_of_library::{self, Foreign};
 use crate::evidence::parameters;
-use crate::evidence::weighed_model::WeighedModel;
+use crate::evidence::prepared::Prepared;
 use crate::fit::blocked_recording::BlockedRecording;
 use crate::fit::model::Model;
 use crate::fit::refit::is_driven;
 use crate::propose::context::FittedModel;
 use crate::propose::excitation::Excitation;
-use crate::thresholds::MATERIAL;
 
 /// Everything that the decision rests on.
 pub(crate) struct Assessment {
@@ -122,7 +122,7 @@ fn only_named(scales: &Scales, weighed: &mut WeighedModel) -> Option<Shown> {
         let is_there = |place: usize| {
             let values = parameters::parameters(context, &patched, place);
             let name = patched.model.effects[place].name;
-            match weighed.effects[named[place]].found.material {
+            match weighed.effects[named[place]].material {
                 Some(_) => parameters::has_size(name, &values),
                 None => parameters::is_there(name, &values),
             }

@@ -5,7 +5,6 @@ use crate::data::recording::Recording;
 use crate::data::rig::Rig;
 use crate::data::schema::{ByModel, Simulation, WindowsOff};
 use crate::simulation::comparison::{Comparison, Figures};
-use crate::thresholds::WORSE_MOTION;
 
 /// Windows for which the report gives errors, s.
 const WINDOWS_S: [f64; 3] = [0.1, 0.5, 2.0];
@@ -18,16 +17,6 @@ pub(crate) fn simulated(nominal: &Rig, refit: &Rig, patched: &Rig, holdout: &[Re
         models.push(("patched".to_owned(), patched.clone()));
     }
     holdout.iter().map(|recording| Comparison::new(recording, &models, &WINDOWS_S)).collect()
-}
-
-/// True if the patched simulation follows the motion less well than the refitted one in windows of
-/// half a second or less, in the geometric mean over their lengths: a wrong starting speed may
-/// spoil the shortest windows of the better simulation.
-pub(crate) fn follows_worse(simulation: &Simulation) -> bool {
-    let short = simulation.windows.iter().filter(|w| w.seconds <= 0.5);
-    let both = short.filter_map(|w| w.position.patched.zip(w.position.refit));
-    let ratios: Vec<f64> = both.map(|(patched, refit)| (patched / refit).ln()).collect();
-    !ratios.is_empty() && ratios.iter().sum::<f64>() / ratios.len() as f64 > WORSE_MOTION.1.ln()
 }
 
 /// Root mean square over all held-out recordings.
@@ -64,30 +53,4 @@ pub(crate) fn pooled(simulated: &[Comparison]) -> Option<Simulation> {
         windows,
         worse: simulated.iter().find_map(Comparison::worse_for_less_force),
     })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_simulation_follows_worse_if_it_does_over_all_short_windows() {
-        let windows = |off: [(f64, f64); 3]| Simulation {
-            windows: WINDOWS_S
-                .into_iter()
-                .zip(off)
-                .map(|(seconds, (refit, patched))| WindowsOff {
-                    seconds,
-                    position: ByModel { nominal: None, refit: Some(refit), patched: Some(patched) },
-                })
-                .collect(),
-            ..Simulation::default()
-        };
-        assert!(follows_worse(&windows([(1.0, 1.2), (1.0, 1.0), (1.0, 0.1)])), "long windows do not count");
-        assert!(
-            !follows_worse(&windows([(1.0, 1.1), (1.0, 0.4), (1.0, 1.0)])),
-            "much better over half a second"
-        );
-        assert!(!follows_worse(&Simulation::default()), "nothing was run");
-    }
 }

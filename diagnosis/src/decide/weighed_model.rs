@@ -1,24 +1,24 @@
 //! A model with the confidence of each of its effects, and what speaks against one of them.
 
 use crate::data::schema::Parameter;
-use crate::evidence::acceptance_criteria::EffectEvidence;
+use crate::decide::confidence::{self, Evidence};
+use crate::decide::elimination::RejectedHypothesis;
+use crate::decide::material::Material;
+use crate::decide::rejection::{Rather, Rejection};
+use crate::decide::thresholds::NAMED;
 use crate::evidence::comparison::Shown;
-use crate::evidence::confidence::{self, Evidence};
-use crate::evidence::contradictions::{are_alike, same_joint};
-use crate::evidence::elimination::RejectedHypothesis;
-use crate::evidence::material::Material;
-use crate::evidence::rejection::{Rather, Rejection};
+use crate::evidence::effect_evidence::EffectEvidence;
 use crate::evidence::tonal::TonalDisturbance;
 use crate::fit::force_residual::Estimator;
 use crate::laws::EffectName;
-use crate::laws::definition::Definition;
 use crate::propose::context::FittedModel;
-use crate::thresholds::NAMED;
 use std::collections::BTreeMap;
 
 /// One effect with what speaks for and against it.
 pub(crate) struct WeighedEffect {
     pub(crate) found: EffectEvidence,
+    /// Its part in the force error, where that names it.
+    pub(crate) material: Option<Material>,
     pub(crate) class: Vec<EffectName>,
     pub(crate) evidence: Evidence,
     pub(crate) confidence: f64,
@@ -55,8 +55,7 @@ pub(crate) struct WeighedModel {
     pub(crate) floor: f64,
     /// True if the model leaves little enough of the force to have understood it.
     pub(crate) understood: bool,
-    /// Frequency at which a force may swing whatever the axis does, and that force if it does.
-    pub(crate) hertz: Option<f64>,
+    /// The force that swings whatever the axis does, if there is one.
     pub(crate) swing: Option<TonalDisturbance>,
     /// Correlation of the residual between repeats of a motion, where there are any and it is
     /// surely more than chance.
@@ -72,27 +71,6 @@ impl WeighedModel {
     /// True if confidence, not a veto, decided.
     pub(crate) fn rests_on_evidence(&self, assessed: &WeighedEffect) -> bool {
         self.contradiction(assessed).is_none()
-    }
-
-    fn same_joint(&self, assessed: &WeighedEffect) -> Option<EffectName> {
-        let gained = |assessed: &WeighedEffect| (assessed.found.effect.name, assessed.found.holdout.sum);
-        same_joint(gained(assessed), self.effects.iter().map(gained))
-    }
-
-    /// True if it is one of two drifts that a change of the inertia explains.
-    fn drifts_alike(&self, assessed: &WeighedEffect) -> bool {
-        let definition = |assessed: &WeighedEffect| assessed.found.effect.name.definition();
-        let change = |is_of: fn(&dyn Definition) -> bool| {
-            let is_drift = |e: &&WeighedEffect| definition(e).drifts() && is_of(definition(e));
-            Some(self.effects.iter().find(is_drift)?.parameters.get("change")?.value)
-        };
-        let (gain, friction) = (change(|of| of.scales_drive()), change(|of| of.needs_dry()));
-        definition(assessed).drifts()
-            && gain.zip(friction).is_some_and(|(gain, friction)| are_alike(gain, friction))
-    }
-
-    pub(crate) fn stands_for_swing(&self) -> bool {
-        self.swing.is_some_and(|swing| swing.is_mistaken())
     }
 
     /// The effect that explains most, with what it would rather be, where something without a name
@@ -173,14 +151,12 @@ impl WeighedModel {
         if let Some(from) = self.twin_beside(assessed) {
             return Some(Rejection::Indistinguishable { from });
         }
-        if assessed.found.material.is_some() {
+        if assessed.material.is_some() {
             // Its shares of the force error, fitted and held out, were judged before it was fitted.
             let no_size = (!assessed.is_there).then_some(Rejection::NoSize);
             return no_size.or_else(|| assessed.found.immaterial());
         }
-        if let Some(swing) = self.swing.filter(TonalDisturbance::is_mistaken) {
-            Some(Rejection::Swing { hertz: swing.hertz })
-        } else if !assessed.is_there {
+        if !assessed.is_there {
             Some(Rejection::NoSize)
         } else if let Some(why) = assessed.found.immaterial() {
             Some(why)
@@ -190,10 +166,6 @@ impl WeighedModel {
             Some(Rejection::Rather(rather.clone()))
         } else if self.effects.iter().any(|other| other.rather.is_some() && other.explains_more(assessed)) {
             Some(Rejection::BesideUnknown)
-        } else if let Some(other) = self.same_joint(assessed) {
-            Some(Rejection::SameJoint { other })
-        } else if self.drifts_alike(assessed) {
-            Some(Rejection::InertiaChanges)
         } else {
             None
         }

@@ -1,5 +1,7 @@
 use super::*;
-use crate::evidence::alternatives::leader;
+use crate::decide::rivals::leader;
+use crate::evidence::effect_evidence::Rival;
+use crate::laws::{Effect, EffectName};
 
 fn gain(sum: f64, low: f64, z: f64) -> Gain {
     Gain { sum, low, high: 2.0 * sum, z, clipped_z: z }
@@ -19,7 +21,6 @@ fn found() -> EffectEvidence {
         at_bound: false,
         is_comb: true,
         sizes: vec![1.0, 1.02, 0.95],
-        material: None,
     }
 }
 
@@ -217,9 +218,9 @@ fn an_effect_that_takes_less_than_a_twentieth_is_not_named() {
 fn no_rival_leads_by_held_out_recordings() {
     let rival = |name, fit_z, z| {
         let effect = Effect::shaped(name, &[]);
-        Rival { name, effect, z, fit_z, lead: -40.0, held_out_lead: -60.0, absence: None }
+        Rival { name, effect, z, fit_z, lead: -40.0, held_out_lead: -60.0, is_absent: false }
     };
-    let leads = |rivals| leader(&[EffectEvidence { rivals, ..found() }]).map(|(_, one)| one.name);
+    let leads = |rivals| leader(&[EffectEvidence { rivals, ..found() }], &[]).map(|(_, one)| one.name);
     let ahead_held_out = rival(EffectName::Cogging, 0.5, -6.0);
     assert_eq!(leads(vec![ahead_held_out.clone()]), None);
     let ahead = rival(EffectName::Backlash, -1.5, 3.0);

@@ -1,11 +1,12 @@
 //! Removes the effects that do not generalise when all are judged together.
 
-use crate::evidence::acceptance_criteria::EffectEvidence;
-use crate::evidence::effect_evidence::gather_evidence;
+use crate::decide::acceptance_criteria::gather_evidence;
+use crate::decide::material::Material;
+use crate::decide::rejection::Rejection;
+use crate::evidence::effect_evidence::EffectEvidence;
 use crate::evidence::holdout_set::HoldoutSet;
-use crate::evidence::material::Material;
 use crate::evidence::parameters;
-use crate::evidence::rejection::Rejection;
+use crate::fit::blocked_recording::BlockedRecording;
 use crate::fit::filter::Noise;
 use crate::fit::noise::Colour;
 use crate::laws::EffectName;
@@ -32,6 +33,17 @@ pub(crate) struct StandingModel {
     pub(crate) materials: Vec<Material>,
 }
 
+/// The model of a proposer, each of whose effects stands, with the recordings in its motion.
+pub(crate) struct Found {
+    /// The fitted recordings in the motion of the model that was found.
+    pub(crate) fit: Vec<BlockedRecording>,
+    /// The recordings that judge, in that motion.
+    pub(crate) holdout: HoldoutSet,
+    /// The null under coloured noise.
+    pub(crate) null: FittedModel,
+    pub(crate) standing: StandingModel,
+}
+
 /// Takes out whatever does not carry to the held-out recordings, the weakest first, until all that
 /// is left does, and judges that; `noise` is white, `null_noise` is the null's coloured one,
 /// `materials` are the effects that shares name.
@@ -46,18 +58,16 @@ pub(crate) fn eliminate(
     let mut rejected = Vec::new();
     loop {
         let plain = context.fit(model.model.clone(), noise, Colour::White);
-        let mut effects = gather_evidence(context, &plain, &model.noise, holdout);
-        for one in &mut effects {
-            one.material = Material::find(materials, one.effect.name).cloned();
-        }
+        let effects = gather_evidence(context, &plain, &model.noise, holdout);
         let weakest = effects
             .iter()
             .enumerate()
             .filter_map(|(i, f)| {
                 // Where other physics limits, nothing explains everything: no likelihood rejects
                 // what shares name.
-                let judged = f.material.is_none().then_some(f)?;
-                let why = judged.rejection().or_else(|| parameters::absence(context, &plain, i))?;
+                let judged = Material::find(materials, f.effect.name).is_none().then_some(f)?;
+                let is_absent = || parameters::is_absent(context, &plain, i);
+                let why = judged.rejection().or_else(|| is_absent().then_some(Rejection::NoSize))?;
                 Some((i, f.holdout.z, why))
             })
             .min_by(|a, b| a.1.total_cmp(&b.1));

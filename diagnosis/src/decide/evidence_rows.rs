@@ -1,10 +1,10 @@
 //! The rows of the evidence table: the figures of both proposers for every hypothesis, named or
 //! not. Nothing here decides.
 
-use super::assess::Assessment;
-use super::evidence_table::EvidenceRow;
 use crate::data::schema::Simulation;
-use crate::evidence::weighed_model::WeighedEffect;
+use crate::decide::assess::Assessment;
+use crate::decide::evidence_table::EvidenceRow;
+use crate::decide::weighed_model::WeighedEffect;
 use crate::laws::EffectName;
 use regression::Hypothesis;
 

@@ -1,16 +1,16 @@
 //! The decisive picture of a name: the force that the refitted simulation leaves, against the state
 //! that the named law acts on, and what the law takes of it.
 
-use crate::evidence::acceptance_criteria::Rival;
+use crate::decide::weighed_model::WeighedModel;
 use crate::evidence::comparison::Shown;
+use crate::evidence::effect_evidence::Rival;
+use crate::evidence::law_band::{Band, Reach};
 use crate::evidence::residual_maps::variable as variable_of;
 use crate::evidence::residuals::Residuals;
-use crate::evidence::weighed_model::WeighedModel;
 use crate::fit::blocked_recording::BlockedRecording;
 use crate::fit::force_residual::Estimator;
 use crate::fit::model::Model;
 use crate::laws::{Effect, EffectName};
-use crate::pipeline::law_band::{Band, Reach};
 
 /// Bins over the state.
 const BINS: usize = 32;

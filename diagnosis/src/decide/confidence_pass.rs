@@ -1,30 +1,30 @@
 //! The confidence of each effect found. Effects that are too unsure are removed and the rest is
 //! weighed again: a false effect takes evidence from a true one.
 
-use crate::evidence::acceptance_criteria::EffectEvidence;
-use crate::evidence::alternatives;
+use crate::decide::acceptance_criteria::gather_evidence;
+use crate::decide::confidence::{self, Leftover};
+use crate::decide::elimination::{StandingModel, eliminate};
+use crate::decide::material::Material;
+use crate::decide::out_of_library;
+use crate::decide::rivals;
+use crate::decide::thresholds::{
+    BEHIND_Z, BRISTLES, LEAVES_MUCH, LIMITED_BY_PHYSICS, MUCH_OF_REFIT, NAMED, SUREST_BESIDE_PHYSICS,
+    UNDECIDED, UNDERSTOOD,
+};
+use crate::decide::weighed_model::{WeighedEffect, WeighedModel};
 use crate::evidence::comparison::Shown;
-use crate::evidence::confidence::{self, Leftover};
-use crate::evidence::effect_evidence::gather_evidence;
-use crate::evidence::elimination::{StandingModel, eliminate};
+use crate::evidence::effect_evidence::EffectEvidence;
 use crate::evidence::holdout_set::HoldoutSet;
-use crate::evidence::out_of_library;
 use crate::evidence::parameters;
 use crate::evidence::repeats::correlation_of_repeats;
 use crate::evidence::residuals::{Residuals, above};
 use crate::evidence::tonal;
-use crate::evidence::weighed_model::{WeighedEffect, WeighedModel};
 use crate::fit::blocked_recording::BlockedRecording;
 use crate::fit::force_residual::Estimator;
-use crate::fit::model::Model;
+use crate::laws::definition::Span;
 use crate::laws::{Effect, EffectName};
-use crate::propose::candidates;
 use crate::propose::context::{FitContext, FittedModel};
 use crate::propose::excitation::Excitation;
-use crate::thresholds::{
-    BEHIND_Z, LEAVES_MUCH, LIMITED_BY_PHYSICS, MUCH_OF_REFIT, NAMED, SUREST_BESIDE_PHYSICS, UNDECIDED,
-    UNDERSTOOD,
-};
 
 /// Least part of a residual's mean square that counts as more than chance.
 const LEAST_ABOVE: f64 = 0.02;
@@ -35,20 +35,17 @@ fn resting(own: f64, unsure: f64, name: EffectName, standing: &[EffectName]) -> 
     if standing.contains(&name) { own } else { own.min(unsure) }
 }
 
+/// Part of the travel over which an effect gives way after a reversal, where that is more than
+/// bristles do: such a spring creeps.
+fn creeps(effect: &Effect, span: &Span) -> Option<f64> {
+    let part = effect.name.definition().gives_way_over(effect)? / span.travel();
+    (part > BRISTLES).then_some(part)
+}
+
 /// Weighs what the search found, and again without what is unsure as long as that makes the rest
 /// surer.
 pub(crate) fn weigh(scales: &Scales, found: StandingModel) -> WeighedModel {
-    let best = scales.without_unsure(scales.once(found, None));
-    if !best.stands_for_swing() || !best.materials.is_empty() {
-        return best;
-    }
-    // No model of the axis explains a force that ignores the axis.
-    let model = scales.context.fit_slow(Model::default(), &[&scales.null.noise]);
-    let materials = Vec::new();
-    let nothing = StandingModel { model, effects: Vec::new(), rejected: best.rejected, materials };
-    let refitted = scales.once(nothing, best.hertz);
-    let dropped = best.dropped.into_iter().chain(best.effects).collect();
-    WeighedModel { dropped, swing: best.swing, ..refitted }
+    scales.without_unsure(scales.once(found))
 }
 
 /// The context in which every model is weighed.
@@ -72,7 +69,7 @@ impl Scales<'_> {
         let mut standing =
             eliminate(model, self.context, self.holdout, &self.null.noise, noise, &best.materials);
         standing.rejected.splice(..0, best.rejected.iter().cloned());
-        self.once(standing, best.hertz)
+        self.once(standing)
     }
 
     fn without_unsure(&self, mut best: WeighedModel) -> WeighedModel {
@@ -98,8 +95,8 @@ impl Scales<'_> {
         }
     }
 
-    /// Weighs a model; `hertz` where the frequency of a swing is known from before.
-    fn once(&self, standing: StandingModel, hertz: Option<f64>) -> WeighedModel {
+    /// Weighs a model.
+    fn once(&self, standing: StandingModel) -> WeighedModel {
         let Self { context, refit, holdout, .. } = *self;
         let (StandingModel { model: slow, effects: found, rejected, materials }, patched) =
             self.against_rivals(standing);
@@ -107,12 +104,17 @@ impl Scales<'_> {
         let shown = Shown::new(context, &holdout.smoothed, &estimator, refit, patched);
         let left = self.left_over(&slow, &shown, &estimator);
         let Shown { on_fit, on_holdout, .. } = &shown;
-        let hertz = hertz.or_else(|| tonal::frequency(&estimator, &left_by(context.tracks, on_fit)));
+        let hertz = tonal::frequency(&estimator, &left_by(context.tracks, on_fit));
         let swing =
             hertz.and_then(|hertz| tonal::swing(&estimator, hertz, &left_by(&holdout.smoothed, on_holdout)));
         let repeats = self.repeats(&shown, &estimator);
         let effects = found.into_iter().enumerate();
-        let effects = effects.map(|(i, found)| self.weigh_effect(found, i, &shown.patched, &left)).collect();
+        let effects = effects
+            .map(|(i, found)| {
+                let material = Material::find(&materials, found.effect.name).cloned();
+                self.weigh_effect(found, material, i, &shown.patched, &left)
+            })
+            .collect();
         WeighedModel {
             effects,
             dropped: Vec::new(),
@@ -123,7 +125,6 @@ impl Scales<'_> {
             materials,
             shown,
             estimator,
-            hertz,
             swing,
             repeats,
         }
@@ -135,12 +136,12 @@ impl Scales<'_> {
     fn against_rivals(&self, mut standing: StandingModel) -> (StandingModel, FittedModel) {
         let contest = |standing: &mut StandingModel, patched: &FittedModel| {
             let StandingModel { model, effects, .. } = standing;
-            alternatives::fit_rivals(self.context, patched, model, self.holdout, effects);
+            rivals::fit_rivals(self.context, patched, model, self.holdout, effects);
         };
         let StandingModel { model: last, materials, .. } = &standing;
         let patched = self.context.fit_shown(last.model.clone(), &last.noise, !materials.is_empty());
         contest(&mut standing, &patched);
-        let leader = alternatives::leader(&standing.effects);
+        let leader = rivals::leader(&standing.effects, &standing.materials);
         match leader.and_then(|(i, rival)| self.replaced(&standing, i, rival)) {
             Some((mut other, patched)) => {
                 contest(&mut other, &patched);
@@ -165,8 +166,8 @@ impl Scales<'_> {
         let slow = context.fit_slow(with, &[&self.null.noise, &model.noise]);
         let white = context.fit_shown(slow.model.clone(), &slow.noise, !materials.is_empty());
         let effects = gather_evidence(context, &white, &slow.noise, holdout);
-        let may_stand = effects.iter().all(|one| one.rejection().is_none())
-            && parameters::absence(context, &white, i).is_none();
+        let may_stand =
+            effects.iter().all(|one| one.rejection().is_none()) && !parameters::is_absent(context, &white, i);
         let (rejected, materials) = (rejected.clone(), materials.clone());
         may_stand.then_some((StandingModel { model: slow, effects, rejected, materials }, white))
     }
@@ -215,6 +216,7 @@ impl Scales<'_> {
     fn weigh_effect(
         &self,
         found: EffectEvidence,
+        material: Option<Material>,
         i: usize,
         patched: &FittedModel,
         left: &LeftOver,
@@ -230,18 +232,19 @@ impl Scales<'_> {
             undecided: false,
             creeps: None,
             found,
+            material,
             evidence,
             parameters,
             rather,
         };
         let found = &weighed.found;
-        if let Some(material) = &found.material {
+        if let Some(material) = &weighed.material {
             weighed.is_there = parameters::has_size(found.effect.name, &weighed.parameters);
             (weighed.class, weighed.confidence) = (material.class.clone(), material.confidence());
             return weighed;
         }
-        let class = alternatives::class(found, self.excitation, left.leaves_much, context);
-        weighed.undecided = alternatives::nearest(found, &class) < BEHIND_Z;
+        let class = rivals::class(found, self.excitation, left.leaves_much, context);
+        weighed.undecided = rivals::nearest(found, &class) < BEHIND_Z;
         // Shares take each recording's bias off, so they do not see what may be constant.
         let is_seen = !found.effect.name.definition().may_be_constant();
         let most = match (weighed.undecided, left.is_other_physics && is_seen) {
@@ -249,7 +252,7 @@ impl Scales<'_> {
             (false, true) => SUREST_BESIDE_PHYSICS,
             (false, false) => 1.0,
         };
-        weighed.creeps = candidates::creeps(&found.effect, context.span)
+        weighed.creeps = creeps(&found.effect, context.span)
             // A spring that creeps depends on time, so no law of the travel fits it everywhere,
             // however far it bends.
             .filter(|_| !found.fits_everywhere());
@@ -274,7 +277,7 @@ struct LeftOver {
 }
 
 fn left_by<'a>(tracks: &'a [BlockedRecording], residuals: &'a Residuals) -> tonal::Left<'a> {
-    tonal::Left { tracks, force: &residuals.force, refit: &residuals.refit, patched: &residuals.patched }
+    tonal::Left { tracks, force: &residuals.force, refit: &residuals.refit }
 }
 
 #[cfg(test)]

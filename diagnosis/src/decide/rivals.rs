@@ -2,7 +2,11 @@
 //! well form its class.
 
 use crate::data::rig::Kind;
-use crate::evidence::acceptance_criteria::{EffectEvidence, Rival};
+use crate::decide::material::Material;
+use crate::decide::thresholds::{
+    BEHIND_PART, BEHIND_SLOW_NATS, BEHIND_SLOW_Z, BEHIND_Z, LEADS_Z, MOST_IN_CLASS,
+};
+use crate::evidence::effect_evidence::{EffectEvidence, Rival};
 use crate::evidence::holdout_likelihood::evaluate_all;
 use crate::evidence::holdout_set::HoldoutSet;
 use crate::evidence::known_travel::known;
@@ -17,9 +21,6 @@ use crate::laws::{Effect, EffectName};
 use crate::propose::context::{FitContext, FittedModel};
 use crate::propose::excitation::Excitation;
 use crate::propose::predictive::left_out_costs;
-use crate::thresholds::{
-    BEHIND_NATS, BEHIND_PART, BEHIND_SLOW_NATS, BEHIND_SLOW_Z, BEHIND_Z, LEADS_Z, MOST_IN_CLASS,
-};
 use numerics::bootstrap::bootstrap;
 use numerics::parallel;
 
@@ -118,11 +119,11 @@ impl Contest<'_> {
         let gain = bootstrap(&lead);
         let last = rival.model.effects.len() - 1;
         let is_near = gain.z.min(on_fit.z) < BEHIND_Z;
-        let absence = is_near.then(|| parameters::absence(context, &rival, last)).flatten();
+        let is_absent = is_near && parameters::is_absent(context, &rival, last);
         let effect = rival.model.effects[last].clone();
         let held_out_lead = lead[fitted..].iter().sum();
         let (z, lead, fit_z) = (gain.z, gain.sum, on_fit.z);
-        Rival { name: effect.name, effect, z, fit_z, lead, held_out_lead, absence }
+        Rival { name: effect.name, effect, z, fit_z, lead, held_out_lead, is_absent }
     }
 
     /// Puts those near rivals behind that only a white noise takes for as good as the winner.
@@ -146,9 +147,10 @@ impl Contest<'_> {
 /// Returns the rival that leads by most on left-out stretches of the fitted recordings, with the
 /// place of the effect that it leads; none where no effect is led. Effects that shares of the force
 /// error name met their rivals there.
-pub(crate) fn leader(found: &[EffectEvidence]) -> Option<(usize, Effect)> {
-    let leads = |rival: &&Rival| rival.fit_z < -LEADS_Z && rival.absence.is_none();
-    let by_likelihood = found.iter().enumerate().filter(|(_, one)| one.material.is_none());
+pub(crate) fn leader(found: &[EffectEvidence], materials: &[Material]) -> Option<(usize, Effect)> {
+    let leads = |rival: &&Rival| rival.fit_z < -LEADS_Z && !rival.is_absent;
+    let has_none = |one: &EffectEvidence| Material::find(materials, one.effect.name).is_none();
+    let by_likelihood = found.iter().enumerate().filter(|(_, one)| has_none(one));
     let all = by_likelihood.flat_map(|(i, one)| one.rivals.iter().filter(leads).map(move |rival| (i, rival)));
     let is_new = |rival: &Rival| found.iter().all(|one| one.effect.name != rival.name);
     let best = all.filter(|(_, rival)| is_new(rival)).min_by(|a, b| a.1.fit_z.total_cmp(&b.1.fit_z));
@@ -176,8 +178,8 @@ pub(crate) fn class(
             class.push(twin);
         }
     }
-    let least = BEHIND_NATS.max(BEHIND_PART * (found.fit.sum + found.holdout.sum));
-    let is_near = |r: &&Rival| (r.z < BEHIND_Z || r.lead < least) && r.absence.is_none();
+    let least = BEHIND_PART * (found.fit.sum + found.holdout.sum);
+    let is_near = |r: &&Rival| (r.z < BEHIND_Z || r.lead < least) && !r.is_absent;
     let mut near: Vec<&Rival> = found.rivals.iter().filter(is_near).collect();
     near.sort_by(|a, b| a.z.total_cmp(&b.z));
     for rival in near {
@@ -190,7 +192,7 @@ pub(crate) fn class(
 
 /// Standard errors that the nearest rival outside an effect's class is behind.
 pub(crate) fn nearest(found: &EffectEvidence, class: &[EffectName]) -> f64 {
-    let outside = found.rivals.iter().filter(|r| !class.contains(&r.name) && r.absence.is_none());
+    let outside = found.rivals.iter().filter(|r| !class.contains(&r.name) && !r.is_absent);
     outside.map(|r| r.z).fold(f64::INFINITY, f64::min)
 }
 

@@ -1,11 +1,11 @@
 //! The effects that the regression names, where other physics and not noise limits.
 
-use crate::laws::EffectName;
-use crate::propose::context::MOST;
-use crate::thresholds::{
+use crate::decide::thresholds::{
     CLAIMED, FOLLOWS_SHARE, MOST_IN_CLASS, NAMED_SHARE, NEAR_LEAD_Z, NEAR_SHARE, SHARE_ODDS, SIZES_AGREE,
     TAKEN_Z, UNLIKELY_Z,
 };
+use crate::laws::EffectName;
+use crate::propose::context::MOST;
 use regression::{HeldOut, Hypothesis};
 
 /// An effect that takes a material part of the force error, on fitted and on held-out recordings,
@@ -70,7 +70,7 @@ fn material(round: &[Hypothesis]) -> Option<Material> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::thresholds::NAMED;
+    use crate::decide::thresholds::NAMED;
     use regression::{Evidence, laws};
 
     /// A law that takes these shares of the fit and of the held-out recordings.

@@ -1,10 +1,10 @@
 //! A check of recordings in seconds: everything that is said before an effect is looked for.
 //! Nothing here names or rejects.
 
-use super::prepare::Prepared;
 use crate::data::recording::Recording;
 use crate::data::rig::{Kind, Rig};
 use crate::data::schema::DataFault;
+use crate::evidence::prepared::Prepared;
 use crate::evidence::residuals::{drive_force, forces};
 use crate::fit::force_residual::Estimator;
 use crate::fit::linear_fit::Fit;

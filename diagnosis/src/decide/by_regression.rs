@@ -1,12 +1,12 @@
 //! The third stage: what the regression names, fitted by the filter. No likelihood rejects it.
 
-use super::prepare::Prepared;
-use super::search::{Found, in_its_own_motion};
-use crate::evidence::effect_evidence::gather_evidence;
-use crate::evidence::elimination::StandingModel;
+use crate::decide::acceptance_criteria::gather_evidence;
+use crate::decide::elimination::{Found, StandingModel};
+use crate::decide::material::{self, Material};
+use crate::decide::thresholds::MOST_IN_CLASS;
 use crate::evidence::holdout_set::HoldoutSet;
 use crate::evidence::known_travel::known;
-use crate::evidence::material::{self, Material};
+use crate::evidence::prepared::Prepared;
 use crate::evidence::residuals::residuals;
 use crate::fit::blocked_recording::BlockedRecording;
 use crate::fit::force_residual::Estimator;
@@ -15,7 +15,7 @@ use crate::fit::noise::Colour;
 use crate::laws::definition::NominalTerm;
 use crate::laws::{Effect, EffectName};
 use crate::propose::context::{FitContext, FittedModel};
-use crate::thresholds::MOST_IN_CLASS;
+use crate::propose::joint::in_its_own_motion;
 use regression::Hypothesis;
 
 /// The recordings with the effects that the regression names; none where it names nothing that the
@@ -78,7 +78,6 @@ fn standing(prepared: &Prepared, found: &Found, first: FittedModel, materials: V
     let mut evidence = gather_evidence(&own, &model, &model.noise, &holdout);
     for (i, one) in evidence.iter_mut().enumerate() {
         one.off_force = off_force(&own, &model, i, &holdout);
-        one.material = Material::find(&materials, one.effect.name).cloned();
     }
     let rejected = found.standing.rejected.clone();
     Found { fit, holdout, null, standing: StandingModel { model, effects: evidence, rejected, materials } }

@@ -3,16 +3,16 @@
 //! what it carries. Nothing here is named; it only speaks against a name. Such forces are defined
 //! with the laws that they are a form of, in `effects`.
 
-use crate::evidence::effect_evidence::gather_evidence;
+use crate::decide::acceptance_criteria::gather_evidence;
+use crate::decide::rejection::Rather;
+use crate::decide::thresholds::{OUTSIDE_ALONE, OUTSIDE_PART};
 use crate::evidence::holdout_set::HoldoutSet;
-use crate::evidence::rejection::Rather;
 use crate::fit::linear_fit::Fit;
 use crate::fit::model::Model;
 use crate::fit::noise::Colour;
 use crate::laws::definition::Unnamed;
 use crate::laws::{Effect, EffectName};
 use crate::propose::context::{FitContext, FittedModel, PER_COEFFICIENT};
-use crate::thresholds::{OUTSIDE_ALONE, OUTSIDE_PART};
 use numerics::parallel;
 
 /// Physics without a name that may look like a fitted effect; all there is where nothing is fitted.

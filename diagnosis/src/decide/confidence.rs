@@ -4,12 +4,13 @@
 //! `prove --calibrate` finds such weights from the evidence that reports carry. The seeds that they
 //! come from may not judge.
 
-use crate::evidence::acceptance_criteria::EffectEvidence;
-use crate::evidence::rejection::Weakness;
-use crate::thresholds::{
+use crate::data::schema::Simulation;
+use crate::decide::rejection::Weakness;
+use crate::decide::thresholds::{
     BIAS, CERTAIN_SHARE, CLAIMED, COUNTED_SHARE, LEFT_OF_FORCE, NAMED, SUREST_Z, UNLIKELY_Z, WEIGHTS,
     WORSE_MOTION,
 };
+use crate::evidence::effect_evidence::EffectEvidence;
 use std::collections::BTreeMap;
 
 /// The evidence for and against a name, by key; logarithms are natural.
@@ -77,9 +78,20 @@ pub(crate) fn weakness(evidence: &Evidence) -> Weakness {
     }
 }
 
+/// True if the patched simulation follows the motion less well than the refitted one in windows of
+/// half a second or less, in the geometric mean over their lengths: a wrong starting speed may
+/// spoil the shortest windows of the better simulation.
+pub(crate) fn follows_worse(simulation: &Simulation) -> bool {
+    let short = simulation.windows.iter().filter(|w| w.seconds <= 0.5);
+    let both = short.filter_map(|w| w.position.patched.zip(w.position.refit));
+    let ratios: Vec<f64> = both.map(|(patched, refit)| (patched / refit).ln()).collect();
+    !ratios.is_empty() && ratios.iter().sum::<f64>() / ratios.len() as f64 > WORSE_MOTION.1.ln()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::data::schema::{ByModel, WindowsOff};
 
     fn evidence(change: &[(&str, f64)]) -> Evidence {
         let mut all: Evidence = WEIGHTS.iter().map(|(key, _)| ((*key).to_owned(), 0.0)).collect();
@@ -116,5 +128,26 @@ mod tests {
         assert!(at("share", -0.1) > at("share", -2.5));
         assert!(at("least_z", 2.0) > at("least_z", 0.7));
         assert!(at("unexplained", 0.9) < at("unexplained", 0.1));
+    }
+
+    #[test]
+    fn a_simulation_follows_worse_if_it_does_over_all_short_windows() {
+        let windows = |off: [(f64, f64); 3]| Simulation {
+            windows: [0.1, 0.5, 2.0]
+                .into_iter()
+                .zip(off)
+                .map(|(seconds, (refit, patched))| WindowsOff {
+                    seconds,
+                    position: ByModel { nominal: None, refit: Some(refit), patched: Some(patched) },
+                })
+                .collect(),
+            ..Simulation::default()
+        };
+        assert!(follows_worse(&windows([(1.0, 1.2), (1.0, 1.0), (1.0, 0.1)])), "long windows do not count");
+        assert!(
+            !follows_worse(&windows([(1.0, 1.1), (1.0, 0.4), (1.0, 1.0)])),
+            "much better over half a second"
+        );
+        assert!(!follows_worse(&Simulation::default()), "nothing was run");
     }
 }

@@ -1,32 +1,32 @@
 //! The fifth stage: the verdict, the effects that are named with their values, and the rigs that
 //! follow from it.
 
-use super::assess::Assessment;
-use super::contenders::contenders;
-use super::decisive::{self, Decisive, Residual};
-use super::diagnosis::{
-    Complete, Diagnosis, FreeForce, JudgedHypothesis, Moved, NamedEffect, Reason, Rigs, Series,
-};
-use super::evidence;
-use super::law_band::Band;
-use super::patched_rig::{patch, place};
-use super::prepare::Prepared;
-use super::run_forward::{follows_worse, pooled, simulated};
-use super::verdict::verdict;
 use crate::data::recording::Recording;
 use crate::data::rig::Rig;
 use crate::data::schema::{Place, Region, Stretch, Verdict};
+use crate::decide::assess::Assessment;
+use crate::decide::confidence;
+use crate::decide::contenders::contenders;
+use crate::decide::decisive::{self, Decisive, Residual};
+use crate::decide::diagnosis::{
+    Complete, Diagnosis, FreeForce, JudgedHypothesis, Moved, NamedEffect, Reason, Rigs, Series,
+};
+use crate::decide::evidence_rows;
+use crate::decide::free_form_check::{FreeFormShare, Unnamed};
+use crate::decide::material;
+use crate::decide::patched_rig::{patch, place};
+use crate::decide::rejection::Rejection;
+use crate::decide::verdict::verdict;
+use crate::decide::weighed_model::{WeighedEffect, WeighedModel};
 use crate::evidence::beside_rivals;
 use crate::evidence::comparison::Shown;
-use crate::evidence::confidence;
-use crate::evidence::free_form_check::{FreeFormShare, Unnamed};
 use crate::evidence::known_travel;
-use crate::evidence::material;
+use crate::evidence::law_band::Band;
 use crate::evidence::parameters;
-use crate::evidence::rejection::Rejection;
+use crate::evidence::prepared::Prepared;
 use crate::evidence::residual_maps::{self, Map};
 use crate::evidence::residuals::{Residuals, above};
-use crate::evidence::weighed_model::{WeighedEffect, WeighedModel};
+use crate::evidence::run_forward::{pooled, simulated};
 use crate::fit::blocked_recording::BlockedRecording;
 use crate::fit::filter::Noise;
 use crate::fit::force_residual::Estimator;
@@ -64,7 +64,7 @@ pub(crate) fn decide(
     let estimator = &assessment.weighed.estimator;
     let mut series = all_series(estimator, &assessment.fit, &shown.on_fit, false);
     series.extend(all_series(estimator, smoothed, &shown.on_holdout, true));
-    let effects = decision.named_effects(with_named, motion.as_ref().is_some_and(follows_worse));
+    let effects = decision.named_effects(with_named, motion.as_ref().is_some_and(confidence::follows_worse));
     // What is named was tested, if not in every order.
     let is_open = |(name, _): &(EffectName, NotTested)| effects.iter().all(|one| !one.class.contains(name));
     let untested =
@@ -87,7 +87,7 @@ pub(crate) fn decide(
         free_form: free_form(unnamed, assessment.beside.as_ref()),
         beyond_fitted: known_travel::beyond(smoothed, &shown.patched.model, &prepared.span),
         decisive,
-        evidence: evidence::rows(assessment, rounds, motion.as_ref()),
+        evidence: evidence_rows::rows(assessment, rounds, motion.as_ref()),
         simulation: motion,
         simulated,
         series,
@@ -269,7 +269,7 @@ fn hypotheses(
                 true => Rejection::Indistinguishable { from: winner },
                 false => Rejection::Behind { winner, z: rival.z },
             };
-            let why = rival.absence.clone().unwrap_or_else(behind);
+            let why = if rival.is_absent { Rejection::NoSize } else { behind() };
             lost(rival.name, Some(one.holdout.sum - rival.held_out_lead), why);
         }
     }

@@ -1,47 +1,27 @@
-//! The evidence for an effect on fitted and on held-out recordings, and the criteria that it must
-//! meet to be named. Nothing here fits or chooses between effects.
+//! The criteria that the evidence for an effect must meet for it to be named. Nothing here fits or
+//! chooses between effects.
 
-use crate::evidence::material::Material;
-use crate::evidence::rejection::Rejection;
-use crate::laws::{Effect, EffectName};
-use crate::thresholds::{
+use crate::decide::rejection::Rejection;
+use crate::decide::thresholds::{
     CERTAIN_Z, FAIR_SHARE, HALF_OF_FORCE, HARDLY_ANOTHER_SIZE, HARMLESS, LEAST_SHARE, MATERIAL, MOST_SHARE,
     NEARLY_ALL_SHARE, PROMISING_Z, SAME_SIZE, SHARE, SURE_Z, UNLIKELY_Z, UNSURE_SHARE, WORSE_Z,
 };
+use crate::evidence::effect_evidence::{self, EffectEvidence};
+use crate::evidence::holdout_set::HoldoutSet;
+use crate::fit::filter::Noise;
+use crate::propose::context::{FitContext, FittedModel};
 use numerics::bootstrap::Gain;
 use std::ops::Range;
 
-/// An effect as it came through the search, before it is judged.
-#[derive(Clone)]
-pub(crate) struct EffectEvidence {
-    pub(crate) effect: Effect,
-    /// The others fitted instead; empty before they are.
-    pub(crate) rivals: Vec<Rival>,
-    /// Held-out gain of the full model over the model without it.
-    pub(crate) holdout: Gain,
-    /// The same on blocks of the fitted recordings that were left out of its fit.
-    pub(crate) fit: Gain,
-    /// The reduction of the force residual on held-out recordings, over the square of the remaining
-    /// one.
-    pub(crate) force: Gain,
-    /// Standard errors of its gain under heavy-tailed noise by block, on left-out blocks of the
-    /// fitted or on held-out recordings, whichever are fewer; zero where it may be named without
-    /// it.
-    pub(crate) score_z: f64,
-    /// Part of the refit's residual above the sensor's noise that it explains, on fitted or on
-    /// held-out recordings.
-    pub(crate) share: f64,
-    /// Part of the held-out force error, root mean square, that it takes off.
-    pub(crate) off_force: f64,
-    /// True if one of its values is at a bound.
-    pub(crate) at_bound: bool,
-    /// True if its waves, if it has any, are those of teeth or poles.
-    pub(crate) is_comb: bool,
-    /// Size that it would have on each recording that plays it, over the size that it has on all,
-    /// fitted ones first; none where no fitted or no held-out one does.
-    pub(crate) sizes: Vec<f64>,
-    /// Its part in the force error, where that names it.
-    pub(crate) material: Option<Material>,
+/// Gathers the evidence for each effect of a model; the score of those that may not be named
+/// without it.
+pub(crate) fn gather_evidence(
+    context: &FitContext,
+    last: &FittedModel,
+    slow: &Noise,
+    holdout: &HoldoutSet,
+) -> Vec<EffectEvidence> {
+    effect_evidence::gather_evidence(context, last, slow, holdout, |found| found.rejection().is_some())
 }
 
 impl EffectEvidence {
@@ -214,23 +194,6 @@ impl EffectEvidence {
             .or_else(|| (!self.is_comb).then_some(Rejection::NotPeriodic))
             .or_else(|| self.at_bound.then_some(Rejection::AtLimit))
     }
-}
-
-/// A rival and how far it is behind.
-#[derive(Clone, Debug)]
-pub(crate) struct Rival {
-    pub(crate) name: EffectName,
-    /// The effect with the shape that fits best.
-    pub(crate) effect: Effect,
-    /// Mean lead of the winner over its standard error, over all segments.
-    pub(crate) z: f64,
-    /// The same over the left-out stretches of the fitted recordings alone.
-    pub(crate) fit_z: f64,
-    /// Lead of the winner in log-likelihood, and how much of it is on held-out recordings.
-    pub(crate) lead: f64,
-    pub(crate) held_out_lead: f64,
-    /// The reason why it may not be named although it explains as much.
-    pub(crate) absence: Option<Rejection>,
 }
 
 #[cfg(test)]

@@ -1,16 +1,16 @@
 //! The models that still contend for a name: each is a whole rig, fitted to the recordings, that an
 //! experiment can distinguish from the others.
 
-use super::assess::Assessment;
-use super::diagnosis::Contender;
-use super::patched_rig::patch;
-use super::prepare::Prepared;
-use crate::evidence::weighed_model::{WeighedEffect, WeighedModel};
+use crate::decide::assess::Assessment;
+use crate::decide::diagnosis::Contender;
+use crate::decide::patched_rig::patch;
+use crate::decide::thresholds::MOST_IN_CLASS;
+use crate::decide::weighed_model::{WeighedEffect, WeighedModel};
+use crate::evidence::prepared::Prepared;
 use crate::fit::model::Model;
 use crate::fit::noise::Colour;
 use crate::laws::{Effect, EffectName};
 use crate::propose::context::{FitContext, FittedModel};
-use crate::thresholds::MOST_IN_CLASS;
 
 /// Rivals beyond this many standard errors behind are out.
 const OUT_Z: f64 = 4.0;
@@ -67,7 +67,7 @@ impl Field<'_> {
         let mut rivals = vec![(contested.found.effect.clone(), 1.0)];
         for rival in &contested.found.rivals {
             let in_class = contested.class.contains(&rival.name);
-            let is_near = rival.absence.is_none() && rival.z < OUT_Z;
+            let is_near = !rival.is_absent && rival.z < OUT_Z;
             if in_class || (is_near && rivals.len() <= MOST_IN_CLASS) {
                 rivals.push((rival.effect.clone(), odds(rival.z)));
             }

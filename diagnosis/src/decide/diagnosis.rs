@@ -1,13 +1,13 @@
 //! A finished diagnosis: everything that a report says, and nothing left to fit.
 
-use super::decisive::Decisive;
-use super::evidence_table::EvidenceRow;
 use crate::data::rig::Rig;
 use crate::data::schema::{FitTable, Parameter, Place, Simulation, Verdict};
-use crate::evidence::confidence::Evidence;
+use crate::decide::confidence::Evidence;
+use crate::decide::decisive::Decisive;
+use crate::decide::evidence_table::EvidenceRow;
+use crate::decide::out_of_library::Foreign;
+use crate::decide::rejection::{Rather, Rejection};
 use crate::evidence::known_travel::BeyondFitted;
-use crate::evidence::out_of_library::Foreign;
-use crate::evidence::rejection::{Rather, Rejection};
 use crate::evidence::residual_maps::Map;
 use crate::fit::blocked_recording::BlockedRecording;
 use crate::laws::EffectName;

@@ -39,18 +39,12 @@ pub(crate) enum Rejection {
     AtLimit,
     /// The interval of its size holds zero.
     NoSize,
-    /// A force that swings at a frequency of its own explains what the effect explains.
-    Swing { hertz: f64 },
     /// The effect would bend over this part of the travel, as only a spring that creeps does.
     Creeps { part: f64 },
     /// Something that has no name in the library explains it better.
     Rather(Rather),
     /// A larger effect in the same model is not in the library.
     BesideUnknown,
-    /// Another effect in the same model is of the same joint and explains more.
-    SameJoint { other: EffectName },
-    /// Gain and friction change by the same part, as where the inertia changes.
-    InertiaChanges,
     /// More effects explain it as well than a class may hold.
     Undecided,
     /// The probability that it is right is too small.

@@ -1,17 +1,17 @@
 //! The verdict. It rests on all that was weighed, not only on what is named; nothing here changes a
 //! model.
 
-use super::diagnosis::Reason;
 use crate::data::schema::Verdict;
+use crate::decide::diagnosis::Reason;
+use crate::decide::thresholds::{DOMINANT, MATERIAL, UNDERSTOOD};
+use crate::decide::weighed_model::WeighedModel;
 use crate::evidence::comparison::Shown;
 use crate::evidence::residual_maps::Map;
 use crate::evidence::residuals::{above, refit_matters};
-use crate::evidence::weighed_model::WeighedModel;
 use crate::fit::blocked_recording::BlockedRecording;
 use crate::fit::nominal::Nominal;
 use crate::laws::CommandLaw;
 use crate::propose::excitation::Excitation;
-use crate::thresholds::{MATERIAL, UNDERSTOOD};
 
 /// Part of the force that must be left, on every recording, to say that the rig's model does not
 /// speak of these recordings.
@@ -64,7 +64,7 @@ pub(crate) fn verdict(
     let again = weighed.repeats.filter(|_| disturbed);
     let swings = weighed
         .swing
-        .filter(|swing| disturbed && swing.is_left_out())
+        .filter(|swing| disturbed && swing.part > DOMINANT)
         .map(|swing| Reason::Swing { part: swing.part, hertz: swing.hertz });
     // What the noise of reading counts hides almost whole is no mismatch, whatever it resembles.
     let is_seen = weighed.floor < (1.0 - MATERIAL) * table.refit.holdout;

@@ -1,17 +1,18 @@
 //! The check of every name against forces of any form, which represent physics outside the library.
 
-use crate::evidence::effect_evidence::gather_evidence;
+use crate::decide::acceptance_criteria::gather_evidence;
+use crate::decide::against_forms::is_told;
+use crate::decide::rejection::Rather;
+use crate::decide::thresholds::FORM_OF_CONSTANT;
+use crate::decide::weighed_model::WeighedModel;
 use crate::evidence::holdout_set::HoldoutSet;
 use crate::evidence::parameters;
-use crate::evidence::rejection::Rather;
-use crate::evidence::weighed_model::WeighedModel;
 use crate::fit::filter::Noise;
 use crate::fit::model::Model;
 use crate::fit::noise::Colour;
 use crate::laws::{Effect, Variable};
 use crate::propose::context::{FitContext, FittedModel};
-use crate::propose::free_form::{Evaluator, Shape, Taken, is_told};
-use crate::thresholds::FORM_OF_CONSTANT;
+use crate::propose::free_form::{Evaluator, Shape, Taken};
 
 /// The gain of a force of any form in addition to a model.
 pub(crate) struct FreeFormShare {
@@ -40,7 +41,7 @@ pub(crate) fn check(
     let model = weighed.shown.patched.model.clone();
     let whole = evaluator.densities(&model);
     for i in named {
-        if weighed.effects[i].found.material.is_some() {
+        if weighed.effects[i].material.is_some() {
             continue;
         }
         let mut less = model.clone();

@@ -1,6 +1,6 @@
-//! Every number that admits or rejects a name, in one place, with its unit and what it means.
-//! Whatever only limits a search (steps, grids, how many candidates are fitted) is where it is
-//! used.
+//! Every number that decides a name, a verdict or a confidence, in one place, with its unit, its
+//! meaning and its source. Whatever only limits a search (steps, grids, how many candidates are
+//! fitted) is where it is used.
 //!
 //! Shares are parts of the refit's mean square above the noise; z is a gain over its standard
 //! error; nats are log-likelihood. Where no other source is given a number was set by hand on
@@ -88,10 +88,8 @@ pub(crate) const BEHIND_Z: f64 = 2.0;
 /// z by which a rival must lead to take an effect's place: it is then the better one with a
 /// probability of 84 %.
 pub(crate) const LEADS_Z: f64 = 1.0;
-/// Nats by which a rival must be behind as well as [`BEHIND_Z`].
-pub(crate) const BEHIND_NATS: f64 = 3.0;
-/// The same as a part of the effect's gain: a smaller lead comes from the form of a law, not from
-/// its name.
+/// Part of the effect's gain by which a rival must be behind as well as [`BEHIND_Z`]: a smaller
+/// lead comes from the form of a law, not from its name.
 pub(crate) const BEHIND_PART: f64 = 0.015;
 /// Nats by which a rival must be behind under coloured noise to be excluded, whatever white noise
 /// gives; half of the winner's gain is needed too.
@@ -100,8 +98,6 @@ pub(crate) const BEHIND_SLOW_NATS: f64 = 30.0;
 pub(crate) const BEHIND_SLOW_Z: f64 = 4.0;
 /// Most effects that a class may hold.
 pub(crate) const MOST_IN_CLASS: usize = 3;
-/// Factor within which drifts of gain and of friction come from one change of the inertia.
-pub(crate) const ALIKE: f64 = 1.5;
 
 /// z from which the gain of a force of any form is sure: ten forms are tried on every model.
 pub(crate) const FORM_SURE_Z: f64 = 3.0;
@@ -132,16 +128,11 @@ pub(crate) const LEAVES_MUCH: f64 = 0.3;
 /// Nats under coloured noise, after the cost of freedom, below which an effect is not judged at
 /// all.
 pub(crate) const MIN_LOG_LIKELIHOOD_GAIN: f64 = 6.0;
-/// Parts of what it is at first that a dry friction may gain with time.
-pub(crate) const DRIFT: Range<f64> = -0.95..3.0;
 /// Most of the travel, as a part of it, over which bristles bend: microns of a slide, tenths of a
 /// degree of a turn.
 pub(crate) const BRISTLES: f64 = 0.03;
-/// A value within this part of a bound counts as at the bound.
-pub(crate) const AT_END: f64 = 0.05;
-/// Part of the refit's residual, at one frequency that does not follow the axis, from which effects
-/// that explain it are rejected as standing for that oscillation.
-pub(crate) const MISTAKEN: f64 = 0.2;
+/// The smallest part of a refit's residual at which a swing is the missing physics.
+pub(crate) const DOMINANT: f64 = 0.4;
 
 /// Residual of a model, over that of a motion read in whole counts, from which other physics
 /// limits, not noise, and shares decide: it is 1.9 in the median on generated nulls and 22 on axes
