@@ -16,6 +16,7 @@ mod fit_friction;
 mod import;
 mod import_page;
 mod man;
+mod model;
 mod one_diagnosis;
 mod recordings;
 mod reproduce;
@@ -59,6 +60,7 @@ enum Command {
     FitForce(fit_force::FitForce),
     FitFriction(fit_friction::FitFriction),
     Completions(completions::Completions),
+    Model(model::Model),
     Man(man::Man),
 }
 
@@ -83,6 +85,7 @@ impl Cli {
             Some(Command::FitForce(command)) => command.run(),
             Some(Command::FitFriction(command)) => command.run(),
             Some(Command::Completions(command)) => command.run(),
+            Some(Command::Model(command)) => command.run(),
             Some(Command::Man(command)) => command.run(),
         }
     }

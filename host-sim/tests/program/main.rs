@@ -27,6 +27,7 @@ mod hostile;
 mod import;
 mod import_refused;
 mod link_faults;
+mod model;
 mod papers_page;
 mod patients;
 mod plant;

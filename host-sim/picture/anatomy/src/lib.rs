@@ -17,10 +17,12 @@ mod outline;
 mod place;
 mod sites;
 pub mod solid;
+mod surface;
 mod vector;
 
 pub use body::{Body, Piece, Role, Structure, Tissue};
 pub use outline::Outline;
 pub use place::{Block, Line, Place, Refusal};
 pub use sites::Site;
+pub use surface::Triangle;
 pub use vector::Vector;
