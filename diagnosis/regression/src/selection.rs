@@ -64,7 +64,7 @@ impl Search {
     fn ask(&mut self) {
         let model = Model::new(&self.problem, Vec::new());
         let waves: Vec<usize> = (0..self.candidates.len())
-            .filter(|i| self.candidates[*i].law.name == "cogging" && self.problem.machine.rig.turn.is_some())
+            .filter(|i| self.candidates[*i].law.key == "cogging" && self.problem.machine.rig.turn.is_some())
             .collect();
         let mut scored = parallel::map_all(&waves, |i| self.score(&model, None, *i));
         scored.sort_by(|a, b| b.share.total_cmp(&a.share));
@@ -84,9 +84,9 @@ impl Search {
 
     /// Scores every law beside the chosen ones; the best of each, in order.
     fn round(&mut self, chosen: &[usize]) -> Vec<Scored> {
-        let names: Vec<&str> = chosen.iter().map(|i| self.candidates[*i].law.name).collect();
+        let names: Vec<&str> = chosen.iter().map(|i| self.candidates[*i].law.key).collect();
         let open: Vec<usize> =
-            (0..self.candidates.len()).filter(|i| !names.contains(&self.candidates[*i].law.name)).collect();
+            (0..self.candidates.len()).filter(|i| !names.contains(&self.candidates[*i].law.key)).collect();
         let (mut best, found) = {
             let model = self.model(chosen);
             let bare = model.without_offsets();
@@ -111,7 +111,7 @@ impl Search {
         scored.sort_by(|a, b| b.valid.cmp(&a.valid).then(b.share.total_cmp(&a.share)));
         let mut seen: Vec<&str> = Vec::new();
         scored.retain(|s| {
-            let name = self.candidates[s.candidate].law.name;
+            let name = self.candidates[s.candidate].law.key;
             let new = !seen.contains(&name);
             seen.push(name);
             new
@@ -121,7 +121,7 @@ impl Search {
 
     /// Moves the law that the first one refines to the front, if the rig has none of it.
     fn plain_before_refined(&self, ranked: &mut [Scored]) {
-        let name = |s: &Scored| self.candidates[s.candidate].law.name;
+        let name = |s: &Scored| self.candidates[s.candidate].law.key;
         let plain = ranked.first().and_then(|s| self.candidates[s.candidate].law.refines);
         let place = ranked.iter().position(|s| Some(name(s)) == plain && s.valid && s.share >= LEAST_SHARE);
         if let Some(place) = place {
@@ -319,7 +319,7 @@ impl Scored {
 
 /// True if a law is a constant force beside others: what it takes is what offsets take.
 fn takes_offsets(candidate: &Candidate) -> bool {
-    candidate.law.name == "asymmetric_friction" && candidate.shapes[0].form != "viscous"
+    candidate.law.key == "asymmetric_friction" && candidate.shapes[0].form != "viscous"
 }
 
 /// Square of the mean over the mean square: 1 if all are equal, 1/n if one is alone.

@@ -107,8 +107,8 @@ fn is_first(name: &str, rig: &Rig, hidden: &Hidden) {
     let found = proposals(rig, hidden);
     let first = &found.rounds[0][0];
     let shown: Vec<_> =
-        found.rounds[0].iter().take(4).map(|h| (h.law.name, h.evidence.share, h.valid)).collect();
-    assert_eq!(first.law.name, name, "{shown:?}");
+        found.rounds[0].iter().take(4).map(|h| (h.law.key, h.evidence.share, h.valid)).collect();
+    assert_eq!(first.law.key, name, "{shown:?}");
     let held = first.evidence.held_out.expect("the first law is read on the holdout");
     assert!(first.valid && first.evidence.share > 0.05 && held.share > 0.05, "{shown:?} {held:?}");
 }
@@ -152,7 +152,7 @@ fn laws_of_the_drive_are_first() {
     // A lag and a delay differ at the top of the band alone (cosine 0.986): both lead.
     for drive in [lagged as fn(&[f64]) -> f64, |u| u[8 * STEPS]] {
         let found = proposals(&rig(), &Hidden { drive, ..NONE });
-        let mut near: Vec<&str> = found.rounds[0].iter().take(2).map(|h| h.law.name).collect();
+        let mut near: Vec<&str> = found.rounds[0].iter().take(2).map(|h| h.law.key).collect();
         near.sort_unstable();
         assert_eq!(near, ["command_delay", "electrical_lag"]);
         assert!(found.rounds[0][0].evidence.share > 0.5);
@@ -182,14 +182,14 @@ fn errors_of_the_reading_are_proposed() {
     // docs/measured/regression.md. That the column takes a share is all that holds so far.
     let loses = |v: f64| if v.abs() > 8.0 { 0.008 * v.signum() } else { 0.0 };
     let found = proposals(&rig(), &Hidden { loses, ..NONE });
-    let missed = found.rounds[0].iter().find(|h| h.law.name == "missed_counts").expect("steps are seen");
+    let missed = found.rounds[0].iter().find(|h| h.law.key == "missed_counts").expect("steps are seen");
     assert!(missed.evidence.share > 0.15 && missed.evidence.z > 3.0, "{missed:?}");
 }
 
 /// Names, shapes and figures of the fit, for comparison.
 fn order(found: &Proposals) -> Vec<String> {
     let all = found.rounds.iter().flatten();
-    all.map(|h| format!("{} {:?} {} {}", h.law.name, h.shapes, h.evidence.share, h.evidence.z)).collect()
+    all.map(|h| format!("{} {:?} {} {}", h.law.key, h.shapes, h.evidence.share, h.evidence.z)).collect()
 }
 
 #[test]

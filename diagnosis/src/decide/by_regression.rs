@@ -39,7 +39,7 @@ pub(crate) fn by_regression(prepared: &Prepared, found: &Found, rounds: &[Vec<Hy
         model = fitted;
         let effect = model.model.effects.last().expect("one was added");
         material.name = effect.name;
-        let twins = material.name.definition().twins(effect, &shown);
+        let twins = effect.twins(&shown);
         material.class = class_of(material.name, twins, material.class);
         materials.push(material);
     }

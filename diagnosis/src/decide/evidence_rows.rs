@@ -22,7 +22,7 @@ pub(crate) fn rows(
         let seen = filter.iter().find(|one| one.found.effect.name == *name).map(|one| one.found.holdout);
         let less = weighed.rejected.iter().find(|one| one.name == *name).and_then(|one| one.holdout_gain);
         // What leads a round is judged beside the laws before it, the rest beside none.
-        let is_law = |one: &&Hypothesis| one.law.name == name.as_str();
+        let is_law = |one: &&Hypothesis| one.law.key == name.as_str();
         let leaders = || rounds.iter().filter_map(|round| round.first());
         let law = leaders().find(is_law).or_else(|| rounds.iter().flatten().find(is_law));
         let is_named = named.contains(name);

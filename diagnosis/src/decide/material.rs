@@ -45,7 +45,7 @@ pub(crate) fn follows(rounds: &[Vec<Hypothesis>]) -> Option<(EffectName, f64)> {
     let (e, held) = (&first.evidence, first.evidence.held_out?);
     let share = held.share.min(e.share);
     (share >= FOLLOWS_SHARE && held.z.min(e.z) >= UNLIKELY_Z)
-        .then(|| Some((EffectName::find(first.law.name)?, share)))?
+        .then(|| Some((EffectName::find(first.law.key)?, share)))?
 }
 
 /// The first law of a round with those that the recordings hardly tell from it; none where it may
@@ -62,8 +62,8 @@ fn material(round: &[Hypothesis]) -> Option<Material> {
         rival.valid && rival.evidence.share >= NEAR_SHARE * e.share && rival.evidence.lead_z > -NEAR_LEAD_Z
     };
     let near = others.iter().filter(is_near).take(MOST_IN_CLASS - 1);
-    let class = [first].into_iter().chain(near).filter_map(|one| EffectName::find(one.law.name)).collect();
-    let name = EffectName::find(first.law.name)?;
+    let class = [first].into_iter().chain(near).filter_map(|one| EffectName::find(one.law.key)).collect();
+    let name = EffectName::find(first.law.key)?;
     is_named.then_some(Material { name, share: least, class })
 }
 
@@ -85,7 +85,7 @@ mod tests {
             rows: 1000.0,
             held_out: Some(HeldOut { share: held_out, z: 5.0, size_agreement: 0.9 }),
         };
-        let law = laws::library().find(|law| law.name == name).expect("a law of the library");
+        let law = laws::library().find(|law| law.key == name).expect("a law of the library");
         Hypothesis { law, shapes: Vec::new(), coefficients: vec![1.0], valid: true, evidence }
     }
 

@@ -173,7 +173,7 @@ pub(crate) fn class(
         count: context.span.count,
         ..excitation.shown()
     };
-    for twin in name.definition().twins(&found.effect, &shown) {
+    for twin in found.effect.twins(&shown) {
         if !class.contains(&twin) {
             class.push(twin);
         }
@@ -205,7 +205,7 @@ mod tests {
         use EffectName as N;
         let of = |name: N, shape: &[(&str, f64)], linear: bool| {
             let shown = Shown { linear, count: 1e-6, ..Shown::default() };
-            name.definition().twins(&Effect::shaped(name, shape), &shown)
+            Effect::shaped(name, shape).twins(&shown)
         };
         assert_eq!(of(N::Backlash, &[("gap", 1.5e-6)], true), [N::DriveCompliance]);
         assert!(of(N::Backlash, &[("gap", 3e-6)], true).is_empty());

@@ -130,7 +130,7 @@ fn twins(shown: &Shown, untested: &[(EffectName, NotTested)]) -> Vec<[EffectName
         |name: &EffectName| name.definition().is_sought() && untested.iter().all(|(other, _)| other != name);
     let mut pairs: Vec<[EffectName; 2]> = Vec::new();
     for name in EffectName::ALL.iter().filter(|name| is_tested(name)) {
-        for other in name.definition().twins(&Effect::shaped(*name, &[]), shown) {
+        for other in Effect::shaped(*name, &[]).twins(shown) {
             let pair = [*name.min(&other), *name.max(&other)];
             if is_tested(&other) && !pairs.contains(&pair) {
                 pairs.push(pair);

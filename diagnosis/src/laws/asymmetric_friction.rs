@@ -97,9 +97,6 @@ impl EffectReport for Defined {
     fn subsystem(&self) -> Subsystem {
         Subsystem::Transmission
     }
-    fn words(&self) -> &'static str {
-        "friction that differs with direction"
-    }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         let mut out = Vec::new();
         let mut put = |name: &str, term: (f64, f64), friction: f64| {

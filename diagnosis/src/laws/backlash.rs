@@ -1,8 +1,7 @@
 //! A gap between motor and load that opens at reversals; the law is in `load`.
 
 use super::definition::{
-    Allowed, Coupling, EffectLaw, EffectReport, EffectSearch, Factors, Fitted, ForceLaw, Movable, Reported,
-    Shown, Span,
+    Allowed, Coupling, EffectLaw, EffectReport, EffectSearch, Factors, Fitted, ForceLaw, Movable, Reported, Span,
 };
 use super::joint_terms::JointTerms;
 use super::load::{Load, MOST_OF_DRY, Machine, RATIOS, gap_of, own_friction};
@@ -64,11 +63,8 @@ impl EffectLaw for Defined {
 }
 
 impl EffectSearch for Defined {
-    fn needs_dry(&self) -> bool {
-        true
-    }
-    fn needs_inertia(&self) -> bool {
-        true
+    fn is_unseen(&self, effect: &Effect, count: f64) -> bool {
+        Shape::of(effect).gap < SEEN * count
     }
     fn has_optima_apart(&self) -> bool {
         true
@@ -99,12 +95,6 @@ impl EffectSearch for Defined {
         let gain = allowed.gain;
         ((8.0 * gain).min(0.1 * gain), (8.0 * gain).max(0.1 * gain))
     }
-    fn twins(&self, effect: &Effect, shown: &Shown) -> Vec<EffectName> {
-        // A gap that the encoder does not see, and the spring that its flanks are.
-        let unseen = Shape::of(effect).gap < SEEN * shown.count;
-        let spring = unseen.then_some(EffectName::DriveCompliance);
-        spring.into_iter().chain(shown.one_length.then_some(EffectName::PreslidingFriction)).collect()
-    }
     fn start_factors(&self) -> &'static [Factors] {
         &[("gap", &[0.6, 1.0, 1.6]), ("coast", &[0.5, 1.0, 1.7]), ("ratio", &[0.6, 1.0, 1.7])]
     }
@@ -113,9 +103,6 @@ impl EffectSearch for Defined {
 impl EffectReport for Defined {
     fn subsystem(&self) -> Subsystem {
         Subsystem::Transmission
-    }
-    fn words(&self) -> &'static str {
-        "a gap at reversals"
     }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         vec![Reported::new("gap", fitted.shape("gap"), fitted.length)]

@@ -51,9 +51,6 @@ impl EffectReport for Defined {
     fn subsystem(&self) -> Subsystem {
         Subsystem::Actuator
     }
-    fn words(&self) -> &'static str {
-        "torque periodic in the angle"
-    }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         waves::report(fitted, false)
     }

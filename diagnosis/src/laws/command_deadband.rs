@@ -31,9 +31,6 @@ impl EffectLaw for Defined {
 }
 
 impl EffectSearch for Defined {
-    fn needs_changing_command(&self) -> bool {
-        true
-    }
     fn has_optima_apart(&self) -> bool {
         true
     }
@@ -56,9 +53,6 @@ impl EffectSearch for Defined {
 impl EffectReport for Defined {
     fn subsystem(&self) -> Subsystem {
         Subsystem::Actuator
-    }
-    fn words(&self) -> &'static str {
-        "a deadband of the command"
     }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         vec![Reported::new("half_width", fitted.shape("half_width"), fitted.command.clone())]

@@ -1,7 +1,7 @@
 //! A drive that clips below its declared limit, at once or softly, as amplifiers near their supply
 //! do.
 
-use super::definition::{EffectLaw, EffectReport, EffectSearch, Fitted, Movable, Reported, Shown, Span};
+use super::definition::{EffectLaw, EffectReport, EffectSearch, Fitted, Movable, Reported, Span};
 use super::joint_terms::JointTerms;
 use super::shape::{ShapeKey, shape};
 use super::{CommandLaw, Effect, EffectName, Subsystem, Variable, experiments};
@@ -41,9 +41,6 @@ impl EffectLaw for Defined {
 }
 
 impl EffectSearch for Defined {
-    fn needs_changing_command(&self) -> bool {
-        true
-    }
     fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
         let limits: Vec<f64> = logarithmic(span.clip * span.command, 0.945 * span.command, 10);
         let hard = limits.iter().map(|&limit| Effect::shaped(name, &[("limit", limit)]));
@@ -58,19 +55,11 @@ impl EffectSearch for Defined {
     fn freedom(&self, _effect: &Effect, _recordings: usize) -> usize {
         0
     }
-    fn twins(&self, _effect: &Effect, shown: &Shown) -> Vec<EffectName> {
-        // Along a line the encoder may be on the load, whose force a grip and a clip limit alike.
-        // An angle is the motor's: a drive that lets go runs away there, and a fit sees it.
-        shown.linear.then_some(EffectName::RollerSlip).into_iter().collect()
-    }
 }
 
 impl EffectReport for Defined {
     fn subsystem(&self) -> Subsystem {
         Subsystem::Actuator
-    }
-    fn words(&self) -> &'static str {
-        "clipping of large commands"
     }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         let limit = Reported::new("limit", fitted.shape("limit"), fitted.command.clone());

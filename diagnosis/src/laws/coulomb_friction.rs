@@ -1,8 +1,7 @@
 //! Dry friction, where the nominal model has none: `-coulomb·sgn(q̇)`.
 
 use super::definition::{
-    Allowed, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, NominalTerm, POSITIVE, Plain, Reported,
-    Shown, Span,
+    Allowed, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, NominalTerm, POSITIVE, Plain, Reported, Span,
 };
 use super::joint_terms::JointTerms;
 use super::law::sign;
@@ -48,9 +47,6 @@ impl EffectSearch for Defined {
     fn grid(&self, name: EffectName, _span: &Span) -> Vec<Effect> {
         vec![Effect::shaped(name, &[])]
     }
-    fn twins(&self, _effect: &Effect, shown: &Shown) -> Vec<EffectName> {
-        shown.one_way.then_some(EffectName::AsymmetricFriction).into_iter().collect()
-    }
     fn limits(&self, _term: usize, _allowed: &Allowed) -> (f64, f64) {
         POSITIVE
     }
@@ -62,9 +58,6 @@ impl EffectSearch for Defined {
 impl EffectReport for Defined {
     fn subsystem(&self) -> Subsystem {
         Subsystem::Transmission
-    }
-    fn words(&self) -> &'static str {
-        "dry friction"
     }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         fitted.one_force("coulomb", fitted.force.into())

@@ -1,7 +1,7 @@
 //! A spring between motor and load, seen as a resonance: what a rigid model misses of two masses.
 
 use super::definition::{
-    Allowed, Coupling, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Movable, Reported, Shown,
+    Allowed, Coupling, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Movable, Reported,
     Span,
 };
 use super::shape::{ShapeKey, shape};
@@ -92,9 +92,6 @@ impl EffectLaw for Defined {
 }
 
 impl EffectSearch for Defined {
-    fn needs_inertia(&self) -> bool {
-        true
-    }
     fn has_optima_apart(&self) -> bool {
         true
     }
@@ -114,18 +111,11 @@ impl EffectSearch for Defined {
         let gain = allowed.gain;
         ((6.0 * gain).min(0.0), (6.0 * gain).max(0.0))
     }
-    fn twins(&self, _effect: &Effect, shown: &Shown) -> Vec<EffectName> {
-        // A spring that explains little of what it should explain may well have a gap.
-        shown.leaves_much.then_some(EffectName::Backlash).into_iter().collect()
-    }
 }
 
 impl EffectReport for Defined {
     fn subsystem(&self) -> Subsystem {
         Subsystem::Transmission
-    }
-    fn words(&self) -> &'static str {
-        "a spring between motor and load"
     }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         let (f, s) = fitted.shape("resonance_hz");

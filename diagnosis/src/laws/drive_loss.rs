@@ -38,9 +38,6 @@ impl EffectLaw for Defined {
 }
 
 impl EffectSearch for Defined {
-    fn needs_changing_command(&self) -> bool {
-        true
-    }
     fn grid(&self, name: EffectName, _span: &Span) -> Vec<Effect> {
         vec![Effect::shaped(name, &[])]
     }
@@ -53,9 +50,6 @@ impl EffectSearch for Defined {
 impl EffectReport for Defined {
     fn subsystem(&self) -> Subsystem {
         Subsystem::Transmission
-    }
-    fn words(&self) -> &'static str {
-        "a loss in proportion to the drive's own force, as a gear has"
     }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         let (loss, sd) = fitted.term(0);

@@ -30,9 +30,6 @@ impl EffectLaw for Defined {
 }
 
 impl EffectSearch for Defined {
-    fn needs_changing_command(&self) -> bool {
-        true
-    }
     fn has_optima_apart(&self) -> bool {
         true
     }
@@ -51,9 +48,6 @@ impl EffectSearch for Defined {
 impl EffectReport for Defined {
     fn subsystem(&self) -> Subsystem {
         Subsystem::Actuator
-    }
-    fn words(&self) -> &'static str {
-        "a first-order lag between command and torque"
     }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         vec![Reported::new("time_constant", fitted.shape("time_constant"), "s")]

@@ -37,9 +37,6 @@ impl EffectReport for Defined {
     fn subsystem(&self) -> Subsystem {
         Subsystem::Sensor
     }
-    fn words(&self) -> &'static str {
-        "an encoder error once per turn"
-    }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         vec![Reported::new("amplitude", waves::amplitude(fitted), fitted.length)]
     }

@@ -2,7 +2,7 @@
 //! viscous·q̇)·(1 - exp(-t/time_constant))`.
 
 use super::definition::{
-    Allowed, EffectLaw, EffectReport, EffectSearch, FREE, Fitted, ForceLaw, Movable, Reported, Shown, Span,
+    Allowed, EffectLaw, EffectReport, EffectSearch, FREE, Fitted, ForceLaw, Movable, Reported, Span,
 };
 use super::law::{first_or_both, sign};
 use super::shape::{ShapeKey, shape};
@@ -56,9 +56,6 @@ impl EffectLaw for Defined {
 }
 
 impl EffectSearch for Defined {
-    fn needs_dry(&self) -> bool {
-        true
-    }
     fn has_optima_apart(&self) -> bool {
         true
     }
@@ -88,17 +85,11 @@ impl EffectSearch for Defined {
     fn freedom(&self, _effect: &Effect, _recordings: usize) -> usize {
         2
     }
-    fn twins(&self, _effect: &Effect, shown: &Shown) -> Vec<EffectName> {
-        shown.one_speed.then_some(EffectName::GainDrift).into_iter().collect()
-    }
 }
 
 impl EffectReport for Defined {
     fn subsystem(&self) -> Subsystem {
         Subsystem::Transmission
-    }
-    fn words(&self) -> &'static str {
-        "friction that changes as the recording goes on"
     }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         let (change, sd) = fitted.term(0);

@@ -6,7 +6,7 @@
 //! speaks only against others.
 
 use super::definition::{
-    Allowed, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Movable, Reported, Shown, Span, Unnamed,
+    Allowed, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Movable, Reported, Span, Unnamed,
 };
 use super::shape::{ShapeKey, shape};
 use super::{Effect, EffectName, State, Subsystem, experiments};
@@ -85,12 +85,6 @@ impl EffectLaw for Defined {
 }
 
 impl EffectSearch for Defined {
-    fn needs_changing_command(&self) -> bool {
-        true
-    }
-    fn needs_inertia(&self) -> bool {
-        true
-    }
     fn has_optima_apart(&self) -> bool {
         true
     }
@@ -116,9 +110,6 @@ impl EffectSearch for Defined {
         let least = 0.9 * allowed.gain.abs() / allowed.gain_reach;
         (-least, least)
     }
-    fn twins(&self, _effect: &Effect, shown: &Shown) -> Vec<EffectName> {
-        shown.one_speed.then_some(EffectName::FrictionDrift).into_iter().collect()
-    }
     fn unnamed(&self, name: EffectName, fitted: Option<&Effect>, span: &Span) -> Vec<Unnamed> {
         if fitted.is_some_and(|effect| effect.name != name) {
             return Vec::new();
@@ -135,9 +126,6 @@ impl EffectSearch for Defined {
 impl EffectReport for Defined {
     fn subsystem(&self) -> Subsystem {
         Subsystem::Actuator
-    }
-    fn words(&self) -> &'static str {
-        "a torque constant that drifts"
     }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         let (change, sd) = fitted.term(0);

@@ -45,9 +45,6 @@ impl EffectReport for Defined {
     fn subsystem(&self) -> Subsystem {
         Subsystem::Transmission
     }
-    fn words(&self) -> &'static str {
-        "dry friction that grows with the load"
-    }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         fitted.one_force("coefficient", "1".into())
     }

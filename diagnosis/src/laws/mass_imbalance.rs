@@ -1,7 +1,7 @@
 //! Gravity on an off-centre mass: once per turn of the axis, or of the motor.
 
 use super::definition::{
-    EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, NominalTerm, Plain, Reported, Shown, Span,
+    EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, NominalTerm, Plain, Reported, Span,
 };
 use super::shape::ShapeKey;
 use super::waves::{self, Waves};
@@ -51,11 +51,6 @@ impl EffectSearch for Defined {
     fn freedom(&self, effect: &Effect, recordings: usize) -> usize {
         waves::freedom(effect, recordings)
     }
-    fn twins(&self, _effect: &Effect, shown: &Shown) -> Vec<EffectName> {
-        // Waves of once a turn, where nothing that turns need be heavy.
-        let wave = shown.linear.then_some(EffectName::Cogging);
-        wave.into_iter().chain(shown.less_than_a_turn.then_some(EffectName::PositionSpring)).collect()
-    }
     fn plain(&self, _effect: &Effect) -> Option<Plain> {
         Some(Plain { rank: 3, has_twin: true })
     }
@@ -64,9 +59,6 @@ impl EffectSearch for Defined {
 impl EffectReport for Defined {
     fn subsystem(&self) -> Subsystem {
         Subsystem::Load
-    }
-    fn words(&self) -> &'static str {
-        "gravity on an off-centre mass"
     }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         vec![Reported::new("amplitude", fitted.scaled(waves::amplitude(fitted)), fitted.force)]

@@ -64,9 +64,6 @@ impl EffectReport for Defined {
     fn subsystem(&self) -> Subsystem {
         Subsystem::Sensor
     }
-    fn words(&self) -> &'static str {
-        "lost encoder counts"
-    }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         // All the counts that were lost in the fitted recordings, whichever way.
         let sum = fitted.lost * fitted.term(0).0;

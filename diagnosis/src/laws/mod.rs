@@ -13,6 +13,7 @@ mod formula;
 pub(crate) mod joint_terms;
 mod law;
 mod load;
+mod record;
 mod shape;
 mod state;
 mod travel_profile;
@@ -127,7 +128,10 @@ impl EffectName {
 
     /// Returns a noun phrase for it that a technician understands.
     pub fn in_words(self) -> &'static str {
-        self.definition().words()
+        match self {
+            Self::Formula(id) => id.get().words,
+            _ => self.record().map_or("a force without a name", |record| record.words),
+        }
     }
 }
 

@@ -102,9 +102,6 @@ impl EffectReport for Defined {
     fn subsystem(&self) -> Subsystem {
         Subsystem::Load
     }
-    fn words(&self) -> &'static str {
-        "damping that changes along the travel"
-    }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         let unit = format!("{}·s/{}", fitted.force, fitted.length);
         vec![Reported::new("span", travel_profile::span(fitted), unit)]

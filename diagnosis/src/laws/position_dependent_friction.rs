@@ -42,9 +42,6 @@ impl EffectSearch for Defined {
     fn profile_values(&self, effect: &Effect) -> f64 {
         travel_profile::degree(effect)
     }
-    fn needs_dry(&self) -> bool {
-        true
-    }
     fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
         travel_profile::grid(name, span)
     }
@@ -56,9 +53,6 @@ impl EffectSearch for Defined {
 impl EffectReport for Defined {
     fn subsystem(&self) -> Subsystem {
         Subsystem::Transmission
-    }
-    fn words(&self) -> &'static str {
-        "dry friction that changes along the travel"
     }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         vec![Reported::new("span", travel_profile::span(fitted), fitted.force)]

@@ -3,7 +3,7 @@
 
 use super::definition::{
     Allowed, EffectLaw, EffectReport, EffectSearch, FREE, Fitted, ForceLaw, Movable, POSITIVE, Plain,
-    Reported, Shown, Span, Unnamed,
+    Reported, Span, Unnamed,
 };
 use super::joint_terms::JointTerms;
 use super::law::first_or_both;
@@ -105,9 +105,6 @@ impl EffectSearch for Defined {
     fn freedom(&self, effect: &Effect, _recordings: usize) -> usize {
         1 + usize::from(Shape::of(effect).preload)
     }
-    fn twins(&self, _effect: &Effect, shown: &Shown) -> Vec<EffectName> {
-        shown.less_than_a_turn.then_some(EffectName::MassImbalance).into_iter().collect()
-    }
     fn plain(&self, effect: &Effect) -> Option<Plain> {
         (!Shape::of(effect).one_sided).then_some(Plain { rank: 5, has_twin: true })
     }
@@ -130,9 +127,6 @@ impl EffectSearch for Defined {
 impl EffectReport for Defined {
     fn subsystem(&self) -> Subsystem {
         Subsystem::Load
-    }
-    fn words(&self) -> &'static str {
-        "a spring along the travel"
     }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         fitted.one_force("stiffness", format!("{}/{}", fitted.force, fitted.length))

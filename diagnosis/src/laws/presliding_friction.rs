@@ -3,7 +3,7 @@
 
 use super::bristles::{Bristles, Shape, lengths};
 use super::definition::{
-    Allowed, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Movable, POSITIVE, Reported, Shown,
+    Allowed, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Movable, POSITIVE, Reported,
     Span,
 };
 use super::joint_terms::{self, JointTerms};
@@ -66,9 +66,6 @@ impl EffectLaw for Defined {
 }
 
 impl EffectSearch for Defined {
-    fn needs_dry(&self) -> bool {
-        true
-    }
     fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
         let at = |spread: f64| {
             logarithmic(2.0 * span.count, 0.03 * span.travel(), 9).into_iter().map(move |deflection| {
@@ -82,9 +79,6 @@ impl EffectSearch for Defined {
     }
     fn limits(&self, _term: usize, _allowed: &Allowed) -> (f64, f64) {
         POSITIVE
-    }
-    fn twins(&self, _effect: &Effect, shown: &Shown) -> Vec<EffectName> {
-        shown.one_length.then_some(EffectName::Backlash).into_iter().collect()
     }
     fn bends_at_reversals(&self) -> bool {
         true
@@ -101,9 +95,6 @@ impl EffectSearch for Defined {
 impl EffectReport for Defined {
     fn subsystem(&self) -> Subsystem {
         Subsystem::Transmission
-    }
-    fn words(&self) -> &'static str {
-        "elastic bristles before sliding"
     }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         let (c, cs) = fitted.scaled(fitted.term(0));

@@ -1,7 +1,7 @@
 //! Drag with the square of speed: `-coefficient·q̇·|q̇|`.
 
 use super::definition::{
-    Allowed, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, POSITIVE, Reported, Shown, Span,
+    Allowed, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, POSITIVE, Reported, Span,
 };
 use super::{Effect, EffectName, State, Subsystem, Variable};
 
@@ -38,17 +38,11 @@ impl EffectSearch for Defined {
     fn limits(&self, _term: usize, _allowed: &Allowed) -> (f64, f64) {
         POSITIVE
     }
-    fn twins(&self, _effect: &Effect, shown: &Shown) -> Vec<EffectName> {
-        shown.one_speed.then_some(EffectName::StribeckFriction).into_iter().collect()
-    }
 }
 
 impl EffectReport for Defined {
     fn subsystem(&self) -> Subsystem {
         Subsystem::Transmission
-    }
-    fn words(&self) -> &'static str {
-        "drag with the square of speed"
     }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         fitted.one_force("coefficient", format!("{}·s²/{}²", fitted.force, fitted.length))

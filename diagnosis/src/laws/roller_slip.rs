@@ -1,8 +1,7 @@
 //! A drive that slips above a force limit; the law is in `load`.
 
 use super::definition::{
-    Allowed, Coupling, EffectLaw, EffectReport, EffectSearch, Factors, Fitted, ForceLaw, Movable, Reported,
-    Shown, Span,
+    Allowed, Coupling, EffectLaw, EffectReport, EffectSearch, Factors, Fitted, ForceLaw, Movable, Reported, Span,
 };
 use super::load::{Load, MOST_OF_DRY, Machine, RATIOS, own_friction};
 use super::shape::{ShapeKey, shape};
@@ -53,9 +52,6 @@ impl EffectLaw for Defined {
 }
 
 impl EffectSearch for Defined {
-    fn needs_inertia(&self) -> bool {
-        true
-    }
     fn has_optima_apart(&self) -> bool {
         true
     }
@@ -97,11 +93,6 @@ impl EffectSearch for Defined {
         let gain = allowed.gain;
         ((8.0 * gain).min(0.3 * gain), (8.0 * gain).max(0.3 * gain))
     }
-    fn twins(&self, _effect: &Effect, shown: &Shown) -> Vec<EffectName> {
-        // Along a line the encoder may be on the load, whose force a grip and a clip limit alike.
-        // An angle is the motor's: a drive that lets go runs away there, and a fit sees it.
-        shown.linear.then_some(EffectName::CommandSaturation).into_iter().collect()
-    }
     fn start_factors(&self) -> &'static [Factors] {
         &[("limit", &[0.72, 0.85, 1.0, 1.2]), ("coast", &[0.6, 0.8, 1.0, 1.3]), ("ratio", &[0.6, 1.0, 1.7])]
     }
@@ -110,9 +101,6 @@ impl EffectSearch for Defined {
 impl EffectReport for Defined {
     fn subsystem(&self) -> Subsystem {
         Subsystem::Transmission
-    }
-    fn words(&self) -> &'static str {
-        "slip of the drive above a force limit"
     }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         // The load's part of what the drive would need to press as hard.

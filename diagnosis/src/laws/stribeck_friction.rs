@@ -2,7 +2,7 @@
 //! (Stribeck 1902; Bo and Pavelescu 1982).
 
 use super::definition::{
-    Allowed, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Movable, POSITIVE, Reported, Shown,
+    Allowed, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Movable, POSITIVE, Reported,
     Span,
 };
 use super::joint_terms::{Drop, JointTerms};
@@ -63,9 +63,6 @@ impl EffectLaw for Defined {
 }
 
 impl EffectSearch for Defined {
-    fn needs_dry(&self) -> bool {
-        true
-    }
     fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
         let from = (2.0 * span.speed_floor).max(0.004 * span.speed);
         let at = |exponent: f64| {
@@ -81,17 +78,11 @@ impl EffectSearch for Defined {
     fn limits(&self, _term: usize, _allowed: &Allowed) -> (f64, f64) {
         POSITIVE
     }
-    fn twins(&self, _effect: &Effect, shown: &Shown) -> Vec<EffectName> {
-        shown.one_speed.then_some(EffectName::QuadraticDrag).into_iter().collect()
-    }
 }
 
 impl EffectReport for Defined {
     fn subsystem(&self) -> Subsystem {
         Subsystem::Transmission
-    }
-    fn words(&self) -> &'static str {
-        "friction that falls as speed rises from zero"
     }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         vec![

@@ -1,7 +1,7 @@
 //! A clip that falls with speed: the supply's voltage against back-EMF. The drive's force is that
 //! of `command` held between `-limit·(1 + q̇/no_load_speed)` and `limit·(1 - q̇/no_load_speed)`.
 
-use super::definition::{EffectLaw, EffectReport, EffectSearch, Fitted, Movable, Reported, Shown, Span};
+use super::definition::{EffectLaw, EffectReport, EffectSearch, Fitted, Movable, Reported, Span};
 use super::shape::{ShapeKey, shape};
 use super::{CommandLaw, Effect, EffectName, Subsystem};
 
@@ -33,9 +33,6 @@ impl EffectLaw for Defined {
 }
 
 impl EffectSearch for Defined {
-    fn needs_changing_command(&self) -> bool {
-        true
-    }
     fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
         let at = |limit: f64, speed: f64| {
             let shape = [("limit", limit * span.command), ("no_load_speed", speed * span.speed)];
@@ -53,18 +50,11 @@ impl EffectSearch for Defined {
     fn freedom(&self, _effect: &Effect, _recordings: usize) -> usize {
         0
     }
-    fn twins(&self, _effect: &Effect, shown: &Shown) -> Vec<EffectName> {
-        // At one speed the line is one limit.
-        shown.one_speed.then_some(EffectName::CommandSaturation).into_iter().collect()
-    }
 }
 
 impl EffectReport for Defined {
     fn subsystem(&self) -> Subsystem {
         Subsystem::Actuator
-    }
-    fn words(&self) -> &'static str {
-        "a clip that falls with speed, as the supply's voltage does against back-EMF"
     }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         let speed = Reported::new("no_load_speed", fitted.shape("no_load_speed"), format!("{}/s", fitted.length));

@@ -152,9 +152,6 @@ impl EffectReport for Defined {
     fn subsystem(&self) -> Subsystem {
         Subsystem::Load
     }
-    fn words(&self) -> &'static str {
-        "a force without a name"
-    }
     /// It is drawn, and has no values of its own.
     fn report(&self, _fitted: &Fitted) -> Vec<Reported> {
         Vec::new()

@@ -44,9 +44,6 @@ impl EffectReport for Defined {
     fn subsystem(&self) -> Subsystem {
         Subsystem::Load
     }
-    fn words(&self) -> &'static str {
-        "a weight that acts through the tilt"
-    }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         fitted.one_force("weight", fitted.force.into())
     }

@@ -45,9 +45,6 @@ impl EffectReport for Defined {
     fn subsystem(&self) -> Subsystem {
         Subsystem::Actuator
     }
-    fn words(&self) -> &'static str {
-        "torque periodic in the angle and proportional to the command"
-    }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         waves::report(fitted, true)
     }

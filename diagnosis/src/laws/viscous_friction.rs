@@ -56,9 +56,6 @@ impl EffectReport for Defined {
     fn subsystem(&self) -> Subsystem {
         Subsystem::Transmission
     }
-    fn words(&self) -> &'static str {
-        "friction that grows with speed"
-    }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         fitted.one_force("viscous", format!("{}·s/{}", fitted.force, fitted.length))
     }

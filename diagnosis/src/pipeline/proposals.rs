@@ -34,7 +34,7 @@ pub(crate) fn unsought(rounds: &[Vec<Hypothesis>]) -> Vec<EffectName> {
     let is_held = |law: &Law| rounds.iter().flatten().any(|one| one.law == law && takes(one));
     let all = regression::laws::library().filter(|law| law.acts_on == ActsOn::Command && !is_held(law));
     let found = if rounds.is_empty() { Vec::new() } else { all.collect() };
-    found.iter().filter_map(|law| EffectName::find(law.name)).collect()
+    found.iter().filter_map(|law| EffectName::find(law.key)).collect()
 }
 
 fn plain(r: &Recording, part: Part) -> regression::Recording {
@@ -87,7 +87,7 @@ mod tests {
             rows: 1000.0,
             held_out: None,
         };
-        let law = laws::library().find(|law| law.name == name).expect("a law of the library");
+        let law = laws::library().find(|law| law.key == name).expect("a law of the library");
         Hypothesis { law, shapes: Vec::new(), coefficients: vec![1.0], valid, evidence }
     }
 

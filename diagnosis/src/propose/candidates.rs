@@ -7,6 +7,7 @@ use crate::fit::nominal::Nominal;
 use crate::laws::definition::{Believed, Movable, NominalTerm, Span};
 use crate::laws::{Effect, EffectName as N};
 use numerics::linear::correlation;
+use regression::laws::Need;
 use std::f64::consts::TAU;
 
 /// Correlation of tilt and angle from which they count as the same.
@@ -139,12 +140,12 @@ pub(crate) fn shapes(name: N, span: &Span, nominal: &Nominal) -> Vec<Effect> {
 
 /// True if an effect shows in such motion.
 pub(crate) fn is_seen(name: N, nominal: &Nominal) -> bool {
-    nominal.virtual_inertia == 0.0 || !name.definition().needs_inertia()
+    nominal.virtual_inertia == 0.0 || !name.needs(Need::Inertia)
 }
 
 /// True if only a command that changes would show an effect, and none does.
 pub(crate) fn needs_another_command(name: N, span: &Span) -> bool {
-    name.definition().needs_changing_command() && !span.command_changes
+    name.needs(Need::ChangingCommand) && !span.command_changes
 }
 
 /// The shape values that refinement may move, with their bounds.

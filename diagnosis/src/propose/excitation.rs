@@ -114,9 +114,7 @@ mod tests {
             (Excitation { turns: 0.5, ..rich }, N::PositionSpring, N::MassImbalance),
         ];
         for (poor, a, b) in twins {
-            let twins = |name: N, seen: Excitation| {
-                name.definition().twins(&Effect::shaped(name, &[]), &seen.shown())
-            };
+            let twins = |name: N, seen: Excitation| Effect::shaped(name, &[]).twins(&seen.shown());
             assert_eq!((twins(a, poor), twins(b, poor)), (vec![b], vec![a]));
             assert!(twins(a, rich).is_empty() && twins(b, rich).is_empty());
         }

@@ -14,6 +14,7 @@ use crate::propose::score_statistic;
 use crate::propose::shape_search::descend;
 use numerics::golden_section::golden;
 use numerics::parallel;
+use regression::laws::Need;
 
 /// The number of effects that are fitted in full at each step.
 const FINALISTS: usize = 8;
@@ -55,7 +56,7 @@ impl FitContext<'_> {
     pub(crate) fn that_may_be_added(&self, model: &Model, wanted: &dyn Fn(N) -> bool) -> Vec<N> {
         let is_dry = |e: &Effect| e.name.definition().nominal_term() == Some(NominalTerm::Coulomb);
         let dry = self.nominal.has(NominalTerm::Coulomb) || model.effects.iter().any(is_dry);
-        self.that_may_show(model, &|name| (dry || !name.definition().needs_dry()) && wanted(name))
+        self.that_may_show(model, &|name| (dry || !name.needs(Need::DryFriction)) && wanted(name))
     }
 
     /// The same, with those that refine a dry friction which neither the rig nor the model has.

@@ -1,64 +1,23 @@
 //! Laws of the drive, which act on the force that the motion asks for.
 
 use super::motion::bristle;
-use super::{ActsOn, Law, Machine, Shape, Size, States};
+use super::{Law, Machine, Shape, States};
 use crate::filters::{derivative, quantile};
 use crate::grid;
 use numerics::linear::{Factor, Square, dot};
 use numerics::spread::spread;
 use std::f64::consts::TAU;
 
-const fn law(
-    name: &'static str,
-    equation: &'static str,
-    words: &'static str,
-    size: Size,
-    shapes: fn(&Machine) -> Vec<Shape>,
-    columns: fn(&Machine, usize, &Shape) -> Vec<Vec<f64>>,
-) -> Law {
-    Law { name, equation, words, acts_on: ActsOn::Command, wave: false, size, refines: None, shapes, columns }
-}
-
-/// The laws, as maps from the force û to what has to be commanded beyond it.
+/// The laws, as maps from the force û to what has to be commanded beyond it; comments say what
+/// shapes them.
 pub(super) static LAWS: [Law; 7] = [
-    law(
-        "command_deadband",
-        "w·clip(û/x, ±1)",
-        "x over the large force",
-        Size::Positive,
-        deadband_shapes,
-        deadband,
-    ),
-    law(
-        "command_saturation",
-        "û·(1 − |û/L|^p)^(−1/p) − û, or a hinge at L",
-        "L over the large force",
-        Size::Positive,
-        clip_shapes,
-        clip,
-    ),
-    law(
-        "supply_limit",
-        "û beyond L·(1 − q̇·sgn û/v)",
-        "L over the large force; v over the fast speed in the form",
-        Size::Positive,
-        supply_shapes,
-        supply,
-    ),
-    law("command_delay", "û(t + τ) − û(t)", "τ, s", Size::OfShape(0.6, 1.6), delay_shapes, delay),
-    law("electrical_lag", "τ·dû/dt", "", Size::Positive, lag_shapes, lag),
-    law(
-        "gain_drift",
-        "û·g(t), or of the heat ∫û²",
-        "time constant over the duration",
-        Size::Any,
-        drift_shapes,
-        drift,
-    ),
-    Law {
-        refines: Some("coulomb_friction"),
-        ..law("drive_loss", "f·|û|·sgn q̇", "", Size::Positive, loss_shapes, loss)
-    },
+    Law::new("command_deadband", deadband_shapes, deadband), // x over the large force
+    Law::new("command_saturation", clip_shapes, clip),       // L over the large force
+    Law::new("supply_limit", supply_shapes, supply), // L over the large force; v over the fast speed in the form
+    Law::new("command_delay", delay_shapes, delay),  // τ, s
+    Law::new("electrical_lag", lag_shapes, lag),
+    Law::new("gain_drift", drift_shapes, drift), // time constant over the duration
+    Law::new("drive_loss", loss_shapes, loss),
 ];
 
 /// Returns the force that the motion asks for: least squares of the recorded force on functions of

@@ -1,10 +1,12 @@
-//! The laws that may be missing: a record each, with its equation, words, shapes and columns.
+//! The laws that may be missing: a record each that every part of the diagnosis reads, and shapes
+//! and columns, by which the regression computes it.
 //!
 //! Every law adds columns to k·u = J·q̈ + b·q̇ + F·sgn q̇ + …; a column is what the drive has to
 //! supply for a coefficient of one.
 
 mod command;
 mod motion;
+mod record;
 mod states;
 #[cfg(test)]
 mod tests;
@@ -12,6 +14,7 @@ mod two_mass;
 mod waves;
 
 pub(crate) use command::{asked_by_motion, large_of};
+pub use record::{Need, RECORDS, Record, Within};
 pub use states::{Scales, States};
 
 use crate::data::Rig;
@@ -43,44 +46,48 @@ pub enum Size {
 pub struct Shape {
     /// Which of the law's forms.
     pub form: &'static str,
-    /// The value that shapes it; see the law's `words`.
+    /// The value that shapes it.
     pub value: f64,
     /// The values between which a line search may move it.
     pub range: Option<(f64, f64)>,
 }
 
-/// A law of the library.
+/// A law as the regression computes it.
 pub struct Law {
-    /// The report's name for it.
-    pub name: &'static str,
-    /// Its columns as a formula.
-    pub equation: &'static str,
-    /// The meaning of the shape's value.
-    pub words: &'static str,
-    /// The signals that it acts on.
-    pub acts_on: ActsOn,
-    /// True if its columns are a sine and a cosine of the place: without an absolute reading every
-    /// recording has a phase of its own.
-    pub wave: bool,
-    /// The values that its first coefficient may have.
-    pub size: Size,
-    /// The plain law that it refines: that one goes first where the rig has none.
-    pub refines: Option<&'static str>,
+    record: &'static Record,
     /// Its shapes on a machine; none where the recordings or the rig rule it out.
     pub shapes: fn(&Machine) -> Vec<Shape>,
     /// Its columns on one recording's grid of the laws.
     pub columns: fn(&Machine, usize, &Shape) -> Vec<Vec<f64>>,
 }
 
+impl Law {
+    const fn new(
+        key: &str,
+        shapes: fn(&Machine) -> Vec<Shape>,
+        columns: fn(&Machine, usize, &Shape) -> Vec<Vec<f64>>,
+    ) -> Self {
+        Self { record: record::of(key), shapes, columns }
+    }
+}
+
+impl std::ops::Deref for Law {
+    type Target = Record;
+
+    fn deref(&self) -> &Record {
+        self.record
+    }
+}
+
 impl std::fmt::Debug for Law {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(self.name)
+        f.write_str(self.key)
     }
 }
 
 impl PartialEq for Law {
     fn eq(&self, other: &Self) -> bool {
-        self.name == other.name
+        self.key == other.key
     }
 }
 

@@ -1,105 +1,23 @@
 //! Laws of friction, drag, springs and readings that rest on the motion alone.
 
-use super::{ActsOn, Law, Machine, Shape, Size};
+use super::{Law, Machine, Shape};
 use numerics::spread::spread;
 
-/// Returns a motion law that is linear in one coefficient of any sign.
-const fn law(
-    name: &'static str,
-    equation: &'static str,
-    words: &'static str,
-    shapes: fn(&Machine) -> Vec<Shape>,
-    columns: fn(&Machine, usize, &Shape) -> Vec<Vec<f64>>,
-) -> Law {
-    Law {
-        name,
-        equation,
-        words,
-        acts_on: ActsOn::Motion,
-        wave: false,
-        size: Size::Any,
-        refines: None,
-        shapes,
-        columns,
-    }
-}
-
-const DRY: Option<&str> = Some("coulomb_friction");
-const VISCOUS: Option<&str> = Some("viscous_friction");
-
-/// The laws.
+/// The laws; comments say what shapes them.
 pub(super) static LAWS: [Law; 13] = [
-    Law { size: Size::Positive, ..law("viscous_friction", "b·q̇", "", viscous_shapes, viscous) },
-    Law { size: Size::Positive, ..law("coulomb_friction", "F·sgn q̇", "", coulomb_shapes, coulomb) },
-    Law {
-        refines: DRY,
-        ..law("asymmetric_friction", "F·|sgn q̇| + b·|q̇|, or one of them", "", asymmetric_shapes, asymmetric)
-    },
-    Law {
-        refines: VISCOUS, size: Size::Positive, ..law("quadratic_drag", "c·q̇·|q̇|", "", always, quadratic)
-    },
-    Law {
-        refines: DRY,
-        size: Size::Positive,
-        ..law(
-            "stribeck_friction",
-            "P·sgn q̇·exp(−(|q̇|/v)^δ)",
-            "v over the fast speed; δ is 1 or 2",
-            stribeck_shapes,
-            stribeck,
-        )
-    },
-    Law {
-        refines: DRY,
-        size: Size::Positive,
-        ..law(
-            "presliding_friction",
-            "F·(z − sgn q̇), z bristles that yield over x",
-            "x over the stroke",
-            presliding_shapes,
-            presliding,
-        )
-    },
-    Law {
-        refines: DRY,
-        ..law(
-            "friction_drift",
-            "F·sgn q̇·exp(−t/τ), or in proportion to t",
-            "τ over the duration",
-            drift_shapes,
-            drift,
-        )
-    },
-    Law {
-        size: Size::Positive,
-        ..law("load_dependent_friction", "µ·|load|·sgn q̇", "", load_shapes, load_friction)
-    },
-    law("position_spring", "c·x + d·x³, or on one side of a place", "the side", spring_shapes, spring),
-    Law {
-        refines: DRY,
-        ..law(
-            "position_dependent_friction",
-            "g(x)·sgn q̇",
-            "place of a step, in half travels",
-            place_shapes,
-            place_friction,
-        )
-    },
-    Law {
-        refines: VISCOUS,
-        ..law(
-            "position_dependent_damping",
-            "g(x)·q̇",
-            "place of a step, in half travels",
-            place_shapes,
-            place_damping,
-        )
-    },
-    law("tilt_gravity", "−W·sin tilt", "", tilt_shapes, tilt),
-    Law {
-        size: Size::OfInertia(0.5, 1.6),
-        ..law("missed_counts", "J·(second difference of the counts lost)", "", missed_shapes, missed)
-    },
+    Law::new("viscous_friction", viscous_shapes, viscous),
+    Law::new("coulomb_friction", coulomb_shapes, coulomb),
+    Law::new("asymmetric_friction", asymmetric_shapes, asymmetric),
+    Law::new("quadratic_drag", always, quadratic),
+    Law::new("stribeck_friction", stribeck_shapes, stribeck), // v over the fast speed; δ is 1 or 2
+    Law::new("presliding_friction", presliding_shapes, presliding), // x over the stroke
+    Law::new("friction_drift", drift_shapes, drift),          // τ over the duration
+    Law::new("load_dependent_friction", load_shapes, load_friction),
+    Law::new("position_spring", spring_shapes, spring), // the side
+    Law::new("position_dependent_friction", place_shapes, place_friction), // place of a step, in half travels
+    Law::new("position_dependent_damping", place_shapes, place_damping), // place of a step, in half travels
+    Law::new("tilt_gravity", tilt_shapes, tilt),
+    Law::new("missed_counts", missed_shapes, missed),
 ];
 
 fn always(_: &Machine) -> Vec<Shape> {

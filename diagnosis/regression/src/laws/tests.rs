@@ -66,7 +66,7 @@ fn machine(q: impl Fn(f64) -> f64, asked: impl Fn(f64) -> f64) -> Machine {
 }
 
 fn column(m: &Machine, name: &str, form: &'static str, value: f64) -> Vec<Vec<f64>> {
-    let law = library().find(|law| law.name == name).expect("a law of the library");
+    let law = library().find(|law| law.key == name).expect("a law of the library");
     (law.columns)(m, 0, &Shape::fixed(form, value))
 }
 

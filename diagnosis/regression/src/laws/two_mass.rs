@@ -1,38 +1,15 @@
 //! A load that follows the motor through a spring, a gap or a grip.
 
-use super::{ActsOn, Law, Machine, Shape, Size, States};
+use super::{Law, Machine, Shape, States};
 use numerics::golden_section::logarithmic;
 use std::f64::consts::TAU;
 
-const fn law(
-    name: &'static str,
-    equation: &'static str,
-    words: &'static str,
-    shapes: fn(&Machine) -> Vec<Shape>,
-    columns: fn(&Machine, usize, &Shape) -> Vec<Vec<f64>>,
-) -> Law {
-    // The load is a part of the nominal inertia, which may be declared half too small.
-    let size = Size::OfInertia(0.0, 1.5);
-    Law { name, equation, words, acts_on: ActsOn::Motion, wave: false, size, refines: None, shapes, columns }
-}
-
 /// The laws; each column is the load's acceleration less the motor's, for the load's inertia.
+/// Comments say what shapes them.
 pub(super) static LAWS: [Law; 3] = [
-    law(
-        "drive_compliance",
-        "J_load·(a_load − q̈), a spring between them",
-        "antiresonance, Hz",
-        spring_shapes,
-        spring,
-    ),
-    law("backlash", "J_load·(a_load − q̈), a gap between them", "gap, rad or m", gap_shapes, gap),
-    law(
-        "roller_slip",
-        "J_load·(a_load − q̈), dry contact between them",
-        "largest acceleration of the load over the hard one",
-        slip_shapes,
-        slip,
-    ),
+    Law::new("drive_compliance", spring_shapes, spring), // antiresonance, Hz
+    Law::new("backlash", gap_shapes, gap),               // gap, rad or m
+    Law::new("roller_slip", slip_shapes, slip),          // largest acceleration of the load over the hard one
 ];
 
 /// Moves a load through a recording; `push` gives its acceleration from its place and speed beside

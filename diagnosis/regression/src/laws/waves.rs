@@ -1,41 +1,16 @@
 //! Forces and errors that repeat along the travel: sines of the place.
 
-use super::{ActsOn, Law, Machine, Shape, Size};
+use super::{Law, Machine, Shape};
 use crate::filters::{derivative, second_difference};
 use numerics::golden_section::logarithmic;
 use std::f64::consts::TAU;
 
-const fn law(
-    name: &'static str,
-    equation: &'static str,
-    words: &'static str,
-    acts_on: ActsOn,
-    shapes: fn(&Machine) -> Vec<Shape>,
-    columns: fn(&Machine, usize, &Shape) -> Vec<Vec<f64>>,
-) -> Law {
-    Law { name, equation, words, acts_on, wave: true, size: Size::Any, refines: None, shapes, columns }
-}
-
-/// The laws.
+/// The laws, each shaped by its period, rad or m.
 pub(super) static LAWS: [Law; 4] = [
-    law("cogging", "A·sin(n·θ) + B·cos(n·θ)", "period, rad or m", ActsOn::Motion, cogging_shapes, wave),
-    law("mass_imbalance", "A·sin q + B·cos q", "period, rad", ActsOn::Motion, imbalance_shapes, wave),
-    law(
-        "encoder_eccentricity",
-        "J·ë + b·ė, e = A·sin θ + B·cos θ",
-        "period, rad",
-        ActsOn::Motion,
-        eccentricity_shapes,
-        eccentricity,
-    ),
-    law(
-        "torque_ripple",
-        "û·(A·sin(n·θ) + B·cos(n·θ))",
-        "period, rad or m",
-        ActsOn::Command,
-        ripple_shapes,
-        ripple,
-    ),
+    Law::new("cogging", cogging_shapes, wave),
+    Law::new("mass_imbalance", imbalance_shapes, wave),
+    Law::new("encoder_eccentricity", eccentricity_shapes, eccentricity),
+    Law::new("torque_ripple", ripple_shapes, ripple),
 ];
 
 /// Highest order: 48 covers seven pole pairs times six, and twelve slots times four.

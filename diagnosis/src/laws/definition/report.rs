@@ -89,9 +89,6 @@ pub(crate) trait EffectReport {
     /// Returns the subsystem that it belongs to.
     fn subsystem(&self) -> Subsystem;
 
-    /// Returns a noun phrase for it that a technician understands.
-    fn words(&self) -> &'static str;
-
     /// The values that are reported.
     fn report(&self, fitted: &Fitted) -> Vec<Reported>;
 

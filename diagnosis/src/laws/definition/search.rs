@@ -2,6 +2,7 @@
 //! confused with.
 
 use crate::laws::{Effect, EffectName};
+use regression::laws::Within;
 
 /// The range of the recordings and the rig's statement of the machine: a grid of shapes depends on
 /// nothing else.
@@ -62,6 +63,21 @@ pub(crate) struct Believed {
     /// Deceleration by dry friction and acceleration per unit of command, rad/s² or m/s².
     pub(crate) dry: f64,
     pub(crate) per_command: f64,
+}
+
+impl Shown {
+    /// True if the recordings, and a fitted effect, are within a limit.
+    pub(crate) fn is_within(&self, limit: Within, effect: &Effect) -> bool {
+        match limit {
+            Within::OneSpeed => self.one_speed,
+            Within::OneWay => self.one_way,
+            Within::OneLength => self.one_length,
+            Within::LessThanATurn => self.less_than_a_turn,
+            Within::Line => self.linear,
+            Within::LeavesMuch => self.leaves_much,
+            Within::UnseenGap => effect.name.definition().is_unseen(effect, self.count),
+        }
+    }
 }
 
 impl Span {
@@ -135,23 +151,6 @@ pub(crate) type Factors = (&'static str, &'static [f64]);
 
 /// The description of an effect for the search.
 pub(crate) trait EffectSearch {
-    /// True if it changes a dry friction, which must be there first.
-    fn needs_dry(&self) -> bool {
-        false
-    }
-
-    /// True if it does not show in motion whose inertia hardly matters: a joint, or the gain, which
-    /// is then the scale of all else.
-    fn needs_inertia(&self) -> bool {
-        false
-    }
-
-    /// True if it does not show where every recording has one command throughout: the drive's force
-    /// is any constant there, and a drift of it any force over the time.
-    fn needs_changing_command(&self) -> bool {
-        false
-    }
-
     /// Returns the number of values of a finer profile along the travel, by which shapes of a grid
     /// differ; 0 if they do not.
     fn profile_values(&self, _effect: &Effect) -> f64 {
@@ -231,10 +230,9 @@ pub(crate) trait EffectSearch {
         1
     }
 
-    /// Other effects that recordings which show so much cannot distinguish from it, however well
-    /// either fits.
-    fn twins(&self, _effect: &Effect, _shown: &Shown) -> Vec<EffectName> {
-        Vec::new()
+    /// True if a reading of whole counts, one of them rad or m, does not show its shape.
+    fn is_unseen(&self, _effect: &Effect, _count: f64) -> bool {
+        false
     }
 
     /// Physics without a name that its law may also be: what may look like `fitted`, an effect of

@@ -89,9 +89,6 @@ impl EffectReport for Formula {
     fn subsystem(&self) -> Subsystem {
         Subsystem::Load
     }
-    fn words(&self) -> &'static str {
-        self.words
-    }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         let terms = self.terms().into_iter().enumerate();
         let of_terms = terms.map(|(k, name)| Reported::new(name, fitted.scaled(fitted.term(k)), "1"));

@@ -43,7 +43,7 @@ pub struct Formula {
     /// As it was read.
     pub text: FormulaText,
     name: &'static str,
-    words: &'static str,
+    pub(super) words: &'static str,
     expression: FlatEx<f64>,
     /// The source of each of the expression's variables.
     sources: Vec<Source>,

@@ -1,0 +1,251 @@
+//! The facts about a law that do not depend on who looks for it: the filter, the regression and the
+//! simulator read this one record. The regression's columns, the filter's terms and the plant's
+//! force are each in the file of who computes them.
+
+use super::{ActsOn, Size};
+
+/// A fact that recordings must show for a law to show.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Need {
+    /// The axis has a dry friction, which the law changes.
+    DryFriction,
+    /// The inertia matters in the motion: where it does not, the drive's force is the scale of all
+    /// else, and no joint shows.
+    Inertia,
+    /// The command changes within a recording: the force of one command throughout is any constant,
+    /// and a drift of it any force over the time.
+    ChangingCommand,
+}
+
+/// A limit of recordings within which two laws are the same force.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Within {
+    /// All motion is at one speed.
+    OneSpeed,
+    /// The axis moves one way only.
+    OneWay,
+    /// All strokes have one length.
+    OneLength,
+    /// The axis moves less than a turn.
+    LessThanATurn,
+    /// The axis moves along a line, where the encoder may be on the load and nothing that turns
+    /// need be heavy. An angle is the motor's: a drive that lets go runs away there, and a fit sees
+    /// it.
+    Line,
+    /// The law leaves much of what it should explain: a spring may then well have a gap.
+    LeavesMuch,
+    /// The encoder does not see the gap: its flanks are a spring.
+    UnseenGap,
+}
+
+/// A law of the library.
+#[derive(Debug, Clone, Copy)]
+pub struct Record {
+    /// Its name in a rig and in a report.
+    pub key: &'static str,
+    /// The force that the drive has to supply for it.
+    pub equation: &'static str,
+    /// A noun phrase for it that a technician understands.
+    pub words: &'static str,
+    /// The signals that it acts on.
+    pub acts_on: ActsOn,
+    /// True if it is a sine of the place: without an absolute reading every recording has a phase
+    /// of its own.
+    pub wave: bool,
+    /// The values that its first coefficient may have.
+    pub size: Size,
+    /// The plain law that it refines: that one goes first where the rig has none.
+    pub refines: Option<&'static str>,
+    /// The facts that recordings must show.
+    pub needs: &'static [Need],
+    /// Laws that no recording within a limit distinguishes from it.
+    pub twins: &'static [(Within, &'static str)],
+}
+
+/// Returns a law of the motion of any size, that every motion may show and that has no twin.
+const fn law(key: &'static str, equation: &'static str, words: &'static str) -> Record {
+    let (acts_on, size) = (ActsOn::Motion, Size::Any);
+    Record { key, equation, words, acts_on, wave: false, size, refines: None, needs: &[], twins: &[] }
+}
+
+/// Returns a law of the drive, which shows where its command changes.
+const fn drive(key: &'static str, equation: &'static str, words: &'static str) -> Record {
+    let needs = &[Need::ChangingCommand];
+    Record { acts_on: ActsOn::Command, size: Size::Positive, needs, ..law(key, equation, words) }
+}
+
+/// The load is a part of the nominal inertia, which may be declared half too small.
+const LOAD: Size = Size::OfInertia(0.0, 1.5);
+const DRY: Option<&str> = Some("coulomb_friction");
+const VISCOUS: Option<&str> = Some("viscous_friction");
+
+/// The laws, those of the motion first.
+pub static RECORDS: [Record; 27] = [
+    Record { size: Size::Positive, ..law("viscous_friction", "b·q̇", "friction that grows with speed") },
+    Record {
+        size: Size::Positive,
+        twins: &[(Within::OneWay, "asymmetric_friction")],
+        ..law("coulomb_friction", "F·sgn q̇", "dry friction")
+    },
+    Record {
+        refines: DRY,
+        ..law(
+            "asymmetric_friction",
+            "F·|sgn q̇| + b·|q̇|, or one of them",
+            "friction that differs with direction",
+        )
+    },
+    Record {
+        refines: VISCOUS,
+        size: Size::Positive,
+        twins: &[(Within::OneSpeed, "stribeck_friction")],
+        ..law("quadratic_drag", "c·q̇·|q̇|", "drag with the square of speed")
+    },
+    Record {
+        refines: DRY,
+        size: Size::Positive,
+        needs: &[Need::DryFriction],
+        twins: &[(Within::OneSpeed, "quadratic_drag")],
+        ..law("stribeck_friction", "P·sgn q̇·exp(−(|q̇|/v)^δ)", "friction that falls as speed rises from zero")
+    },
+    Record {
+        refines: DRY,
+        size: Size::Positive,
+        needs: &[Need::DryFriction],
+        twins: &[(Within::OneLength, "backlash")],
+        ..law(
+            "presliding_friction",
+            "F·(z − sgn q̇), z bristles that yield over x",
+            "elastic bristles before sliding",
+        )
+    },
+    Record {
+        refines: DRY,
+        needs: &[Need::DryFriction],
+        twins: &[(Within::OneSpeed, "gain_drift")],
+        ..law(
+            "friction_drift",
+            "F·sgn q̇·exp(−t/τ), or in proportion to t",
+            "friction that changes as the recording goes on",
+        )
+    },
+    Record {
+        size: Size::Positive,
+        ..law("load_dependent_friction", "µ·|load|·sgn q̇", "dry friction that grows with the load")
+    },
+    Record {
+        twins: &[(Within::LessThanATurn, "mass_imbalance")],
+        ..law("position_spring", "c·x + d·x³, or on one side of a place", "a spring along the travel")
+    },
+    Record {
+        refines: DRY,
+        needs: &[Need::DryFriction],
+        ..law("position_dependent_friction", "g(x)·sgn q̇", "dry friction that changes along the travel")
+    },
+    Record {
+        refines: VISCOUS,
+        ..law("position_dependent_damping", "g(x)·q̇", "damping that changes along the travel")
+    },
+    law("tilt_gravity", "−W·sin tilt", "a weight that acts through the tilt"),
+    Record {
+        size: Size::OfInertia(0.5, 1.6),
+        ..law("missed_counts", "J·(second difference of the counts lost)", "lost encoder counts")
+    },
+    Record {
+        size: LOAD,
+        needs: &[Need::Inertia],
+        twins: &[(Within::LeavesMuch, "backlash")],
+        ..law(
+            "drive_compliance",
+            "J_load·(a_load − q̈), a spring between them",
+            "a spring between motor and load",
+        )
+    },
+    Record {
+        size: LOAD,
+        needs: &[Need::DryFriction, Need::Inertia],
+        twins: &[(Within::UnseenGap, "drive_compliance"), (Within::OneLength, "presliding_friction")],
+        ..law("backlash", "J_load·(a_load − q̈), a gap between them", "a gap at reversals")
+    },
+    Record {
+        size: LOAD,
+        needs: &[Need::Inertia],
+        twins: &[(Within::Line, "command_saturation")],
+        ..law(
+            "roller_slip",
+            "J_load·(a_load − q̈), dry contact between them",
+            "slip of the drive above a force limit",
+        )
+    },
+    Record { wave: true, ..law("cogging", "A·sin(n·θ) + B·cos(n·θ)", "torque periodic in the angle") },
+    Record {
+        wave: true,
+        twins: &[(Within::Line, "cogging"), (Within::LessThanATurn, "position_spring")],
+        ..law("mass_imbalance", "A·sin q + B·cos q", "gravity on an off-centre mass")
+    },
+    Record {
+        wave: true,
+        ..law("encoder_eccentricity", "J·ë + b·ė, e = A·sin θ + B·cos θ", "an encoder error once per turn")
+    },
+    Record {
+        wave: true,
+        acts_on: ActsOn::Command,
+        ..law(
+            "torque_ripple",
+            "û·(A·sin(n·θ) + B·cos(n·θ))",
+            "torque periodic in the angle and proportional to the command",
+        )
+    },
+    drive("command_deadband", "w·clip(û/x, ±1)", "a deadband of the command"),
+    Record {
+        twins: &[(Within::Line, "roller_slip")],
+        ..drive(
+            "command_saturation",
+            "û·(1 − |û/L|^p)^(−1/p) − û, or a hinge at L",
+            "clipping of large commands",
+        )
+    },
+    Record {
+        twins: &[(Within::OneSpeed, "command_saturation")],
+        ..drive(
+            "supply_limit",
+            "û beyond L·(1 − q̇·sgn û/v)",
+            "a clip that falls with speed, as the supply's voltage does against back-EMF",
+        )
+    },
+    Record {
+        size: Size::OfShape(0.6, 1.6),
+        ..drive("command_delay", "û(t + τ) − û(t)", "a delay between command and torque")
+    },
+    drive("electrical_lag", "τ·dû/dt", "a first-order lag between command and torque"),
+    Record {
+        size: Size::Any,
+        needs: &[Need::ChangingCommand, Need::Inertia],
+        twins: &[(Within::OneSpeed, "friction_drift")],
+        ..drive("gain_drift", "û·g(t), or of the heat ∫û²", "a torque constant that drifts")
+    },
+    Record {
+        refines: DRY,
+        ..drive("drive_loss", "f·|û|·sgn q̇", "a loss in proportion to the drive's own force, as a gear has")
+    },
+];
+
+/// Returns the record of a key; a law without one does not compile.
+pub(super) const fn of(key: &str) -> &'static Record {
+    let mut i = 0;
+    while i < RECORDS.len() {
+        if is_same(RECORDS[i].key.as_bytes(), key.as_bytes()) {
+            return &RECORDS[i];
+        }
+        i += 1;
+    }
+    panic!("a law needs a record")
+}
+
+const fn is_same(a: &[u8], b: &[u8]) -> bool {
+    let mut i = 0;
+    while i < a.len() && i < b.len() && a[i] == b[i] {
+        i += 1;
+    }
+    i == a.len() && i == b.len()
+}
