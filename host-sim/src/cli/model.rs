@@ -3,8 +3,9 @@
 use anatomy::{Body, Role, Triangle};
 use clap::Args;
 use convert::export::write;
-use device_sim::Profile;
+
 use device_sim::error::Error;
+use device_sim::profile::Profile;
 use live::{examples, say};
 use std::io::{self, Write};
 use std::path::PathBuf;
