@@ -8,7 +8,7 @@ use super::definition::{
 use super::joint_terms::JointTerms;
 use super::law::{first_or_both, sign};
 use super::shape::{ShapeKey, shape};
-use super::{Effect, EffectName, State, Subsystem, Variable};
+use super::{Effect, EffectName, State, Variable};
 
 #[derive(Debug, Clone)]
 struct AsymmetricFrictionLaw {
@@ -94,9 +94,6 @@ impl EffectSearch for Defined {
 }
 
 impl EffectReport for Defined {
-    fn subsystem(&self) -> Subsystem {
-        Subsystem::Transmission
-    }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         let mut out = Vec::new();
         let mut put = |name: &str, term: (f64, f64), friction: f64| {

@@ -6,7 +6,7 @@ use super::definition::{
 use super::joint_terms::JointTerms;
 use super::load::{Load, MOST_OF_DRY, Machine, RATIOS, gap_of, own_friction};
 use super::shape::{ShapeKey, shape};
-use super::{Effect, EffectName, State, Subsystem};
+use super::{Effect, EffectName, State};
 use numerics::golden_section::logarithmic;
 
 #[derive(Debug, Clone)]
@@ -101,9 +101,6 @@ impl EffectSearch for Defined {
 }
 
 impl EffectReport for Defined {
-    fn subsystem(&self) -> Subsystem {
-        Subsystem::Transmission
-    }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         vec![Reported::new("gap", fitted.shape("gap"), fitted.length)]
     }

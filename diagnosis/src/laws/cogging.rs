@@ -5,7 +5,7 @@ use super::definition::{EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw,
 use super::joint_terms::{JointTerms, Wave};
 use super::shape::ShapeKey;
 use super::waves::{self, Waves};
-use super::{Effect, EffectName, Subsystem, Variable};
+use super::{Effect, EffectName, Variable};
 
 pub(super) struct Defined;
 
@@ -48,9 +48,6 @@ impl EffectSearch for Defined {
 }
 
 impl EffectReport for Defined {
-    fn subsystem(&self) -> Subsystem {
-        Subsystem::Actuator
-    }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         waves::report(fitted, false)
     }

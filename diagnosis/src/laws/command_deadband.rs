@@ -2,7 +2,7 @@
 
 use super::definition::{EffectLaw, EffectReport, EffectSearch, Fitted, Movable, Reported, Span};
 use super::shape::{ShapeKey, shape};
-use super::{CommandLaw, Effect, EffectName, Subsystem, Variable};
+use super::{CommandLaw, Effect, EffectName, Variable};
 use numerics::golden_section::logarithmic;
 
 shape! {
@@ -51,9 +51,6 @@ impl EffectSearch for Defined {
 }
 
 impl EffectReport for Defined {
-    fn subsystem(&self) -> Subsystem {
-        Subsystem::Actuator
-    }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         vec![Reported::new("half_width", fitted.shape("half_width"), fitted.command.clone())]
     }

@@ -4,7 +4,7 @@
 use super::definition::{EffectLaw, EffectReport, EffectSearch, Fitted, Movable, Reported, Span};
 use super::joint_terms::JointTerms;
 use super::shape::{ShapeKey, shape};
-use super::{CommandLaw, Effect, EffectName, Subsystem, Variable, experiments};
+use super::{CommandLaw, Effect, EffectName, Variable, experiments};
 use numerics::golden_section::logarithmic;
 
 shape! {
@@ -58,9 +58,6 @@ impl EffectSearch for Defined {
 }
 
 impl EffectReport for Defined {
-    fn subsystem(&self) -> Subsystem {
-        Subsystem::Actuator
-    }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         let limit = Reported::new("limit", fitted.shape("limit"), fitted.command.clone());
         let is_soft = Shape::of(fitted.effect).softness > 0.0;

@@ -5,7 +5,7 @@ use super::definition::{
 };
 use super::joint_terms::JointTerms;
 use super::law::sign;
-use super::{Effect, EffectName, State, Subsystem, Variable};
+use super::{Effect, EffectName, State, Variable};
 
 #[derive(Debug, Clone)]
 struct CoulombFrictionLaw;
@@ -56,9 +56,6 @@ impl EffectSearch for Defined {
 }
 
 impl EffectReport for Defined {
-    fn subsystem(&self) -> Subsystem {
-        Subsystem::Transmission
-    }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         fitted.one_force("coulomb", fitted.force.into())
     }

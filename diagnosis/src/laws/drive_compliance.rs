@@ -5,7 +5,7 @@ use super::definition::{
     Span,
 };
 use super::shape::{ShapeKey, shape};
-use super::{Effect, EffectName, State, Subsystem};
+use super::{Effect, EffectName, State};
 use numerics::golden_section::logarithmic;
 use std::f64::consts::TAU;
 
@@ -114,9 +114,6 @@ impl EffectSearch for Defined {
 }
 
 impl EffectReport for Defined {
-    fn subsystem(&self) -> Subsystem {
-        Subsystem::Transmission
-    }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         let (f, s) = fitted.shape("resonance_hz");
         let (x, sd) = fitted.term(0);

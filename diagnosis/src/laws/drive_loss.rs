@@ -3,7 +3,7 @@
 
 use super::definition::{Allowed, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Reported, Span};
 use super::law::sign;
-use super::{Effect, EffectName, State, Subsystem};
+use super::{Effect, EffectName, State};
 
 #[derive(Debug, Clone)]
 struct DriveLossLaw;
@@ -48,9 +48,6 @@ impl EffectSearch for Defined {
 }
 
 impl EffectReport for Defined {
-    fn subsystem(&self) -> Subsystem {
-        Subsystem::Transmission
-    }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         let (loss, sd) = fitted.term(0);
         let ratio = fitted.ratio.abs();

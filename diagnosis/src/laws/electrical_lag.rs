@@ -3,7 +3,7 @@
 use super::definition::{EffectLaw, EffectReport, EffectSearch, Fitted, Movable, Reported, Span};
 use super::joint_terms::JointTerms;
 use super::shape::{ShapeKey, shape};
-use super::{CommandLaw, Effect, EffectName, Subsystem, experiments};
+use super::{CommandLaw, Effect, EffectName, experiments};
 use numerics::golden_section::logarithmic;
 
 shape! {
@@ -46,9 +46,6 @@ impl EffectSearch for Defined {
 }
 
 impl EffectReport for Defined {
-    fn subsystem(&self) -> Subsystem {
-        Subsystem::Actuator
-    }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         vec![Reported::new("time_constant", fitted.shape("time_constant"), "s")]
     }

@@ -4,7 +4,7 @@ use super::definition::{EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw,
 use super::mass_imbalance::{LEAST_TURNS, once_a_turn};
 use super::shape::ShapeKey;
 use super::waves::{self, Waves};
-use super::{Effect, EffectName, Subsystem};
+use super::{Effect, EffectName};
 
 pub(super) struct Defined;
 
@@ -34,9 +34,6 @@ impl EffectSearch for Defined {
 }
 
 impl EffectReport for Defined {
-    fn subsystem(&self) -> Subsystem {
-        Subsystem::Sensor
-    }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         vec![Reported::new("amplitude", waves::amplitude(fitted), fitted.length)]
     }

@@ -6,7 +6,7 @@ use super::definition::{
 };
 use super::law::{first_or_both, sign};
 use super::shape::{ShapeKey, shape};
-use super::{Effect, EffectName, State, Subsystem, experiments};
+use super::{Effect, EffectName, State, experiments};
 use numerics::golden_section::logarithmic;
 
 shape! {
@@ -88,9 +88,6 @@ impl EffectSearch for Defined {
 }
 
 impl EffectReport for Defined {
-    fn subsystem(&self) -> Subsystem {
-        Subsystem::Transmission
-    }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         let (change, sd) = fitted.term(0);
         let base = if fitted.own_dry == 0.0 { fitted.dry.unwrap_or(0.0) } else { fitted.own_dry }.abs();

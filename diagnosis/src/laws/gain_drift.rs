@@ -9,7 +9,7 @@ use super::definition::{
     Allowed, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Movable, Reported, Span, Unnamed,
 };
 use super::shape::{ShapeKey, shape};
-use super::{Effect, EffectName, State, Subsystem, experiments};
+use super::{Effect, EffectName, State, experiments};
 use numerics::golden_section::logarithmic;
 
 shape! {
@@ -124,9 +124,6 @@ impl EffectSearch for Defined {
 }
 
 impl EffectReport for Defined {
-    fn subsystem(&self) -> Subsystem {
-        Subsystem::Actuator
-    }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         let (change, sd) = fitted.term(0);
         vec![

@@ -4,7 +4,7 @@ use super::definition::{
     Allowed, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, POSITIVE, Reported, Span,
 };
 use super::law::sign;
-use super::{Effect, EffectName, State, Subsystem};
+use super::{Effect, EffectName, State};
 
 #[derive(Debug, Clone)]
 struct LoadDependentFrictionLaw;
@@ -42,9 +42,6 @@ impl EffectSearch for Defined {
 }
 
 impl EffectReport for Defined {
-    fn subsystem(&self) -> Subsystem {
-        Subsystem::Transmission
-    }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         fitted.one_force("coefficient", "1".into())
     }

@@ -5,7 +5,7 @@ use super::definition::{
 };
 use super::shape::ShapeKey;
 use super::waves::{self, Waves};
-use super::{Effect, EffectName, Subsystem, Variable};
+use super::{Effect, EffectName, Variable};
 
 /// Part of a turn of the motor over which once a turn is distinguished from a slope, and of the
 /// axis over which gravity bends from a spring's straight line.
@@ -57,9 +57,6 @@ impl EffectSearch for Defined {
 }
 
 impl EffectReport for Defined {
-    fn subsystem(&self) -> Subsystem {
-        Subsystem::Load
-    }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         vec![Reported::new("amplitude", fitted.scaled(waves::amplitude(fitted)), fitted.force)]
     }

@@ -3,7 +3,7 @@
 
 use super::definition::{Allowed, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Reported, Span};
 use super::shape::{Missing, ShapeKey};
-use super::{Effect, EffectName, State, Subsystem};
+use super::{Effect, EffectName, State};
 
 #[derive(Debug, Clone)]
 struct MissedCountsLaw {
@@ -61,9 +61,6 @@ impl EffectSearch for Defined {
 }
 
 impl EffectReport for Defined {
-    fn subsystem(&self) -> Subsystem {
-        Subsystem::Sensor
-    }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         // All the counts that were lost in the fitted recordings, whichever way.
         let sum = fitted.lost * fitted.term(0).0;

@@ -26,6 +26,7 @@ pub use formula::{Formula, FormulaId, FormulaText};
 pub use law::Law;
 pub(crate) use law::{sinc, wave_mean};
 pub(crate) use load::WholeMachine;
+pub use regression::laws::Subsystem;
 pub use state::State;
 pub use table::ForceTable;
 pub use variable::Variable;
@@ -35,17 +36,6 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use shape::{Missing, ShapeKey};
 use std::collections::BTreeMap;
 use std::fmt;
-
-/// The subsystem that an effect belongs to.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-#[allow(missing_docs)]
-pub enum Subsystem {
-    Transmission,
-    Actuator,
-    Load,
-    Sensor,
-}
 
 macro_rules! registry {
     ($($variant:ident $module:ident;)*) => {
@@ -119,11 +109,6 @@ impl EffectName {
             Self::Formula(id) => Some(id.get()),
             _ => None,
         }
-    }
-
-    /// Returns the subsystem that it belongs to.
-    pub(crate) fn subsystem(self) -> Subsystem {
-        self.definition().subsystem()
     }
 
     /// Returns a noun phrase for it that a technician understands.

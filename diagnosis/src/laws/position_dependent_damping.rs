@@ -5,7 +5,7 @@ use super::definition::{EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw,
 use super::law::legendre;
 use super::shape::{ShapeKey, shape};
 use super::travel_profile::{self, Profile};
-use super::{Effect, EffectName, State, Subsystem, experiments};
+use super::{Effect, EffectName, State, experiments};
 
 #[derive(Debug, Clone)]
 struct PositionDependentDampingLaw {
@@ -99,9 +99,6 @@ impl EffectSearch for Defined {
 }
 
 impl EffectReport for Defined {
-    fn subsystem(&self) -> Subsystem {
-        Subsystem::Load
-    }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         let unit = format!("{}·s/{}", fitted.force, fitted.length);
         vec![Reported::new("span", travel_profile::span(fitted), unit)]

@@ -4,7 +4,7 @@ use super::definition::{EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw,
 use super::law::{legendre, sign};
 use super::shape::ShapeKey;
 use super::travel_profile::{self, Profile};
-use super::{Effect, EffectName, State, Subsystem, experiments};
+use super::{Effect, EffectName, State, experiments};
 
 #[derive(Debug, Clone)]
 struct PositionDependentFrictionLaw(Profile);
@@ -51,9 +51,6 @@ impl EffectSearch for Defined {
 }
 
 impl EffectReport for Defined {
-    fn subsystem(&self) -> Subsystem {
-        Subsystem::Transmission
-    }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         vec![Reported::new("span", travel_profile::span(fitted), fitted.force)]
     }

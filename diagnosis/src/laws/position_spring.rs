@@ -8,7 +8,7 @@ use super::definition::{
 use super::joint_terms::JointTerms;
 use super::law::first_or_both;
 use super::shape::{ShapeKey, shape};
-use super::{Effect, EffectName, State, Subsystem, Variable, experiments};
+use super::{Effect, EffectName, State, Variable, experiments};
 
 shape! {
     /// The place and the kind of the spring.
@@ -125,9 +125,6 @@ impl EffectSearch for Defined {
 }
 
 impl EffectReport for Defined {
-    fn subsystem(&self) -> Subsystem {
-        Subsystem::Load
-    }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         fitted.one_force("stiffness", format!("{}/{}", fitted.force, fitted.length))
     }

@@ -9,7 +9,7 @@ use super::definition::{
 use super::joint_terms::{self, JointTerms};
 use super::law::{first_or_both, sign};
 use super::shape::ShapeKey;
-use super::{Effect, EffectName, State, Subsystem};
+use super::{Effect, EffectName, State};
 use numerics::golden_section::logarithmic;
 
 /// Longest over shortest of the lengths over which bristles bend, where they are not all alike:
@@ -93,9 +93,6 @@ impl EffectSearch for Defined {
 }
 
 impl EffectReport for Defined {
-    fn subsystem(&self) -> Subsystem {
-        Subsystem::Transmission
-    }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         let (c, cs) = fitted.scaled(fitted.term(0));
         let (d, ds) = fitted.shape("deflection");

@@ -3,7 +3,7 @@
 use super::definition::{
     Allowed, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, POSITIVE, Reported, Span,
 };
-use super::{Effect, EffectName, State, Subsystem, Variable};
+use super::{Effect, EffectName, State, Variable};
 
 #[derive(Debug, Clone)]
 struct QuadraticDragLaw;
@@ -41,9 +41,6 @@ impl EffectSearch for Defined {
 }
 
 impl EffectReport for Defined {
-    fn subsystem(&self) -> Subsystem {
-        Subsystem::Transmission
-    }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         fitted.one_force("coefficient", format!("{}·s²/{}²", fitted.force, fitted.length))
     }

@@ -2,13 +2,18 @@
 
 use crate::laws::definition::Shown;
 use crate::laws::{Effect, EffectName};
-use regression::laws::{Need, RECORDS, Record};
+use regression::laws::{Need, RECORDS, Record, Subsystem};
 
 impl EffectName {
     /// The facts that filter, regression and simulator share; none of a user's own formula, nor of
     /// a force without a name.
     pub(super) fn record(self) -> Option<&'static Record> {
         RECORDS.iter().find(|record| record.key == self.as_str())
+    }
+
+    /// Returns the subsystem that it belongs to.
+    pub(crate) fn subsystem(self) -> Subsystem {
+        self.record().map_or(Subsystem::Load, |record| record.subsystem)
     }
 
     /// True if recordings show it only where they show a fact.

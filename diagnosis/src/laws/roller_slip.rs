@@ -5,7 +5,7 @@ use super::definition::{
 };
 use super::load::{Load, MOST_OF_DRY, Machine, RATIOS, own_friction};
 use super::shape::{ShapeKey, shape};
-use super::{Effect, EffectName, State, Subsystem, experiments};
+use super::{Effect, EffectName, State, experiments};
 use numerics::golden_section::logarithmic;
 
 #[derive(Debug, Clone)]
@@ -99,9 +99,6 @@ impl EffectSearch for Defined {
 }
 
 impl EffectReport for Defined {
-    fn subsystem(&self) -> Subsystem {
-        Subsystem::Transmission
-    }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         // The load's part of what the drive would need to press as hard.
         let (limit, s) = fitted.shape("limit");

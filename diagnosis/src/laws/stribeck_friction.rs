@@ -8,7 +8,7 @@ use super::definition::{
 use super::joint_terms::{Drop, JointTerms};
 use super::law::sign;
 use super::shape::{ShapeKey, shape};
-use super::{Effect, EffectName, State, Subsystem, Variable};
+use super::{Effect, EffectName, State, Variable};
 use numerics::golden_section::logarithmic;
 
 #[derive(Debug, Clone)]
@@ -81,9 +81,6 @@ impl EffectSearch for Defined {
 }
 
 impl EffectReport for Defined {
-    fn subsystem(&self) -> Subsystem {
-        Subsystem::Transmission
-    }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         vec![
             Reported::new("peak", fitted.scaled(fitted.term(0)), fitted.force),

@@ -3,7 +3,7 @@
 
 use super::definition::{EffectLaw, EffectReport, EffectSearch, Fitted, Movable, Reported, Span};
 use super::shape::{ShapeKey, shape};
-use super::{CommandLaw, Effect, EffectName, Subsystem};
+use super::{CommandLaw, Effect, EffectName};
 
 shape! {
     /// The line that the supply draws.
@@ -53,9 +53,6 @@ impl EffectSearch for Defined {
 }
 
 impl EffectReport for Defined {
-    fn subsystem(&self) -> Subsystem {
-        Subsystem::Actuator
-    }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         let speed = Reported::new("no_load_speed", fitted.shape("no_load_speed"), format!("{}/s", fitted.length));
         vec![speed, Reported::new("limit", fitted.shape("limit"), fitted.command.clone())]

@@ -2,7 +2,7 @@
 
 use super::definition::{EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Reported, Span};
 use super::shape::{Missing, ShapeKey};
-use super::{Effect, EffectName, State, Subsystem, Variable};
+use super::{Effect, EffectName, State, Variable};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
@@ -149,9 +149,6 @@ impl EffectSearch for Defined {
 }
 
 impl EffectReport for Defined {
-    fn subsystem(&self) -> Subsystem {
-        Subsystem::Load
-    }
     /// It is drawn, and has no values of its own.
     fn report(&self, _fitted: &Fitted) -> Vec<Reported> {
         Vec::new()

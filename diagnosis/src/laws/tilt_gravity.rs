@@ -3,7 +3,7 @@
 use super::definition::{
     EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, NominalTerm, Plain, Reported, Span,
 };
-use super::{Effect, EffectName, State, Subsystem};
+use super::{Effect, EffectName, State};
 
 #[derive(Debug, Clone)]
 struct TiltGravityLaw;
@@ -41,9 +41,6 @@ impl EffectSearch for Defined {
 }
 
 impl EffectReport for Defined {
-    fn subsystem(&self) -> Subsystem {
-        Subsystem::Load
-    }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         fitted.one_force("weight", fitted.force.into())
     }

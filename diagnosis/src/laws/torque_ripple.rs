@@ -4,7 +4,7 @@
 use super::definition::{Allowed, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Reported, Span};
 use super::shape::ShapeKey;
 use super::waves::{self, Waves};
-use super::{Effect, EffectName, Subsystem};
+use super::{Effect, EffectName};
 
 pub(super) struct Defined;
 
@@ -42,9 +42,6 @@ impl EffectSearch for Defined {
 }
 
 impl EffectReport for Defined {
-    fn subsystem(&self) -> Subsystem {
-        Subsystem::Actuator
-    }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         waves::report(fitted, true)
     }

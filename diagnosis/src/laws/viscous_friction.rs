@@ -5,7 +5,7 @@ use super::definition::{
     Span,
 };
 use super::joint_terms::JointTerms;
-use super::{Effect, EffectName, State, Subsystem, Variable};
+use super::{Effect, EffectName, State, Variable};
 
 #[derive(Debug, Clone)]
 struct ViscousFrictionLaw;
@@ -53,9 +53,6 @@ impl EffectSearch for Defined {
 }
 
 impl EffectReport for Defined {
-    fn subsystem(&self) -> Subsystem {
-        Subsystem::Transmission
-    }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         fitted.one_force("viscous", format!("{}·s/{}", fitted.force, fitted.length))
     }

@@ -14,7 +14,7 @@ mod two_mass;
 mod waves;
 
 pub(crate) use command::{asked_by_motion, large_of};
-pub use record::{Need, RECORDS, Record, Within};
+pub use record::{Need, RECORDS, Record, Subsystem, Within};
 pub use states::{Scales, States};
 
 use crate::data::Rig;

@@ -3,6 +3,18 @@
 //! force are each in the file of who computes them.
 
 use super::{ActsOn, Size};
+use serde::{Deserialize, Serialize};
+
+/// The subsystem that a law belongs to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+#[allow(missing_docs)]
+pub enum Subsystem {
+    Transmission,
+    Actuator,
+    Load,
+    Sensor,
+}
 
 /// A fact that recordings must show for a law to show.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -47,6 +59,8 @@ pub struct Record {
     pub equation: &'static str,
     /// A noun phrase for it that a technician understands.
     pub words: &'static str,
+    /// The subsystem that it belongs to.
+    pub subsystem: Subsystem,
     /// The signals that it acts on.
     pub acts_on: ActsOn,
     /// True if it is a sine of the place: without an absolute reading every recording has a phase
@@ -62,16 +76,28 @@ pub struct Record {
     pub twins: &'static [(Within, &'static str)],
 }
 
-/// Returns a law of the motion of any size, that every motion may show and that has no twin.
+/// Returns a law of the transmission and of the motion, of any size, that every motion may show and
+/// that has no twin.
 const fn law(key: &'static str, equation: &'static str, words: &'static str) -> Record {
-    let (acts_on, size) = (ActsOn::Motion, Size::Any);
-    Record { key, equation, words, acts_on, wave: false, size, refines: None, needs: &[], twins: &[] }
+    Record {
+        key,
+        equation,
+        words,
+        subsystem: Subsystem::Transmission,
+        acts_on: ActsOn::Motion,
+        wave: false,
+        size: Size::Any,
+        refines: None,
+        needs: &[],
+        twins: &[],
+    }
 }
 
 /// Returns a law of the drive, which shows where its command changes.
 const fn drive(key: &'static str, equation: &'static str, words: &'static str) -> Record {
     let needs = &[Need::ChangingCommand];
-    Record { acts_on: ActsOn::Command, size: Size::Positive, needs, ..law(key, equation, words) }
+    let (subsystem, acts_on) = (Subsystem::Actuator, ActsOn::Command);
+    Record { subsystem, acts_on, size: Size::Positive, needs, ..law(key, equation, words) }
 }
 
 /// The load is a part of the nominal inertia, which may be declared half too small.
@@ -134,6 +160,7 @@ pub static RECORDS: [Record; 27] = [
         ..law("load_dependent_friction", "µ·|load|·sgn q̇", "dry friction that grows with the load")
     },
     Record {
+        subsystem: Subsystem::Load,
         twins: &[(Within::LessThanATurn, "mass_imbalance")],
         ..law("position_spring", "c·x + d·x³, or on one side of a place", "a spring along the travel")
     },
@@ -143,11 +170,16 @@ pub static RECORDS: [Record; 27] = [
         ..law("position_dependent_friction", "g(x)·sgn q̇", "dry friction that changes along the travel")
     },
     Record {
+        subsystem: Subsystem::Load,
         refines: VISCOUS,
         ..law("position_dependent_damping", "g(x)·q̇", "damping that changes along the travel")
     },
-    law("tilt_gravity", "−W·sin tilt", "a weight that acts through the tilt"),
     Record {
+        subsystem: Subsystem::Load,
+        ..law("tilt_gravity", "−W·sin tilt", "a weight that acts through the tilt")
+    },
+    Record {
+        subsystem: Subsystem::Sensor,
         size: Size::OfInertia(0.5, 1.6),
         ..law("missed_counts", "J·(second difference of the counts lost)", "lost encoder counts")
     },
@@ -177,17 +209,24 @@ pub static RECORDS: [Record; 27] = [
             "slip of the drive above a force limit",
         )
     },
-    Record { wave: true, ..law("cogging", "A·sin(n·θ) + B·cos(n·θ)", "torque periodic in the angle") },
     Record {
+        subsystem: Subsystem::Actuator,
+        wave: true,
+        ..law("cogging", "A·sin(n·θ) + B·cos(n·θ)", "torque periodic in the angle")
+    },
+    Record {
+        subsystem: Subsystem::Load,
         wave: true,
         twins: &[(Within::Line, "cogging"), (Within::LessThanATurn, "position_spring")],
         ..law("mass_imbalance", "A·sin q + B·cos q", "gravity on an off-centre mass")
     },
     Record {
+        subsystem: Subsystem::Sensor,
         wave: true,
         ..law("encoder_eccentricity", "J·ë + b·ė, e = A·sin θ + B·cos θ", "an encoder error once per turn")
     },
     Record {
+        subsystem: Subsystem::Actuator,
         wave: true,
         acts_on: ActsOn::Command,
         ..law(
@@ -225,6 +264,7 @@ pub static RECORDS: [Record; 27] = [
         ..drive("gain_drift", "û·g(t), or of the heat ∫û²", "a torque constant that drifts")
     },
     Record {
+        subsystem: Subsystem::Transmission,
         refines: DRY,
         ..drive("drive_loss", "f·|û|·sgn q̇", "a loss in proportion to the drive's own force, as a gear has")
     },

@@ -1,6 +1,6 @@
 //! The description of an effect in a report.
 
-use crate::laws::{Effect, EffectName, Subsystem};
+use crate::laws::{Effect, EffectName};
 use numerics::linear::Square;
 
 /// A fitted effect, from which its values are reported.
@@ -86,9 +86,6 @@ pub(crate) fn sized(pairs: &[(f64, f64)]) -> (f64, f64) {
 
 /// The description of an effect in a report.
 pub(crate) trait EffectReport {
-    /// Returns the subsystem that it belongs to.
-    fn subsystem(&self) -> Subsystem;
-
     /// The values that are reported.
     fn report(&self, fitted: &Fitted) -> Vec<Reported>;
 

@@ -4,7 +4,7 @@ use super::Formula;
 use crate::laws::definition::{
     Allowed, EffectLaw, EffectReport, EffectSearch, FREE, Fitted, ForceLaw, Movable, POSITIVE, Reported, Span,
 };
-use crate::laws::{Effect, EffectName, State, Subsystem};
+use crate::laws::{Effect, EffectName, State};
 
 /// A formula along a recording or in a plant, with the values of its shape.
 #[derive(Debug, Clone)]
@@ -86,9 +86,6 @@ impl EffectSearch for Formula {
 }
 
 impl EffectReport for Formula {
-    fn subsystem(&self) -> Subsystem {
-        Subsystem::Load
-    }
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         let terms = self.terms().into_iter().enumerate();
         let of_terms = terms.map(|(k, name)| Reported::new(name, fitted.scaled(fitted.term(k)), "1"));
