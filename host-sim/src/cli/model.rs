@@ -12,8 +12,9 @@ use std::path::PathBuf;
 
 /// Write the skin of a patient's limb, or a vein, as an STL file to be printed.
 ///
-/// The patient is one with a body in three dimensions. The file is binary and in mm: x along the limb
-/// away from the trunk, z down, the limb's axis at y = z = 0, so that skin and vein fit together.
+/// The patient is one with a body in three dimensions. The file is binary and in mm: x along the
+/// limb away from the trunk, z down, the limb's axis at y = z = 0, so that skin and vein fit
+/// together.
 #[derive(Args)]
 #[command(after_help = examples!("Example: host-sim model --profile forearm --structure vein --out vein.stl"))]
 pub(crate) struct Model {

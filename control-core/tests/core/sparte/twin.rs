@@ -28,7 +28,7 @@ pub(super) struct Twin {
     still: u32,
     furthest: f64,
     direction: f64,
-    /// Whether rounding has decided if a resting needle goes on: a count's time apart is seen in
+    /// True if rounding has decided that a resting needle goes on: a count's time apart is seen in
     /// the force.
     pub(super) is_tied: bool,
 }

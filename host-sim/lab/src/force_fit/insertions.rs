@@ -55,7 +55,7 @@ pub struct Insertion {
     pub points: Vec<(f64, f64)>,
 }
 
-/// Whether a CSV has to say the angle of the needle.
+/// The way in which the angle of the needle in a CSV is treated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Angle {
     /// A file without it is refused.
@@ -147,8 +147,8 @@ fn from_recording(recording: &Recording) -> Vec<Vec<Moment>> {
     moments.collect()
 }
 
-/// `time_s,depth_mm,force_n` and, where it is needed, `angle_deg` or `tilt_rad`, in any order; other
-/// columns are ignored.
+/// `time_s,depth_mm,force_n` and, where it is needed, `angle_deg` or `tilt_rad`, in any order;
+/// other columns are ignored.
 fn parse_csv(file: &str, text: &str, angle: Angle) -> Result<Vec<Moment>, Error> {
     let mut lines = text.lines().enumerate();
     let header = lines.next().map_or("", |(_, line)| line).trim_start_matches('\u{feff}');

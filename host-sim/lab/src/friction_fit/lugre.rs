@@ -24,7 +24,7 @@ pub struct Lugre {
     pub damping_n_s_per_mm: f64,
     /// σ₂, N·s/mm.
     pub viscous_n_s_per_mm: f64,
-    /// What the sensor reads without a force, N.
+    /// The sensor's reading without a force, N.
     pub zero_n: f64,
 }
 

@@ -171,7 +171,7 @@ impl Problem {
         friction(values).forces(&self.motion).split_off(self.from)
     }
 
-    /// What these values leave of the forces.
+    /// The residual of the forces with these values, N.
     fn rest(&self, values: &Values) -> Vec<f64> {
         self.judged()
             .iter()
@@ -237,8 +237,8 @@ impl Problem {
         })
     }
 
-    /// Standard errors that hold whatever the rest looks like: what is left of [`BLOCK`] rows
-    /// counts once (White's estimator over blocks).
+    /// Standard errors that hold however the residual is correlated within [`BLOCK`] rows (White's
+    /// estimator over blocks).
     fn standard_errors(&self, values: &Values) -> Lugre {
         let slopes = self.slopes(values);
         let inverse = Factor::new(&normal(&slopes)).inverse();

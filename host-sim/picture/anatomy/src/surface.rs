@@ -121,7 +121,8 @@ mod tests {
 
     #[test]
     fn an_arm_has_the_volume_of_its_formula() {
-        // An elliptic cylinder of 34 + 8 + 2 by 26 + 8 + 2 mm, and the outermost ball and cylinder of the shoulder.
+        // An elliptic cylinder of 34 + 8 + 2 by 26 + 8 + 2 mm, and the outermost ball and cylinder
+        // of the shoulder.
         let radius = 44.0 + 5.0 + 2.5_f64;
         for (site, fat, along, wanted) in [
             (Site::Forearm, 8.0, [-60.0, 80.0], PI * 44.0 * 36.0 * 140.0),

@@ -12,9 +12,9 @@ const FEWEST_FPS: f64 = 50.0;
 /// any.
 const FPS_WINDOWS: usize = 20;
 /// Loops of [`loop_time`] that a second of the page takes of the processor, at most, on a machine
-/// that reaches fewer pictures: what a page of 50 pictures a second may take, so that one that is too
-/// slow in itself takes more. Measured: 85 with 54 pictures a second, 97 with 14 while nine other
-/// programs wanted the two cores.
+/// that reaches fewer pictures: what a page of 50 pictures a second may take, so that one that is
+/// too slow in itself takes more. Measured: 85 with 54 pictures a second, 97 with 14 while nine
+/// other programs wanted the two cores.
 const MOST_LOOPS_A_SECOND: f64 = 125.0;
 
 /// The needle moves, both punctures are listed, the plots change, and all of it at the rate of the
@@ -73,8 +73,8 @@ struct PictureRate {
     loops_per_second: f64,
 }
 
-/// The rate of the screen; where a slow machine does not reach it, the page may not take more of the
-/// processor than one that does.
+/// The rate of the screen; where a slow machine does not reach it, the page may not take more of
+/// the processor than one that does.
 fn picture_rate(page: &mut Page, browser: &Chromium) -> Result<PictureRate, Error> {
     let loop_s = loop_time().as_secs_f64();
     let mut rates = Vec::new();
