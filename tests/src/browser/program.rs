@@ -30,9 +30,13 @@ impl Places {
         Ok(Self { target, program })
     }
 
-    /// A folder of one's own for pictures and recordings.
+    /// An empty folder of one's own for pictures and recordings.
     pub fn scratch(&self, name: &str) -> Result<PathBuf, Error> {
         let scratch = self.target.join(name);
+        if scratch.exists() {
+            std::fs::remove_dir_all(&scratch)
+                .map_err(|e| format!("cannot remove {}: {e}", scratch.display()))?;
+        }
         std::fs::create_dir_all(&scratch).map_err(|e| format!("cannot create {}: {e}", scratch.display()))?;
         Ok(scratch)
     }

@@ -41,7 +41,6 @@ fn visit() -> Result<(), Error> {
     let scratch = places.scratch("page-test")?;
     let browser = Chromium::start(&scratch)?;
     let recording = scratch.join("watched.mcap");
-    let _ = fs::remove_file(&recording);
     let mut program = Program::start(&places.program, 0, Some(&recording))?;
     let mut page = Page::open(&browser, &program.url, DESKTOP.0, DESKTOP.1, false)?;
     let mut rows = watch(&mut page, &browser)?;

@@ -22,7 +22,6 @@ fn a_patient_is_shaped_saved_and_driven_without_a_file() {
 fn visit() -> Result<(), Error> {
     let places = Places::find()?;
     let scratch = places.scratch("page-editor")?;
-    let _ = std::fs::remove_dir_all(scratch.join("patients"));
     let browser = Chromium::start(&scratch)?;
     let program = Program::start_in(&places.program, &scratch, &["run", "--port", "0"])?;
     let mut page = open(&browser, &program.url, SIZES[0])?;

@@ -2,7 +2,6 @@
 //! what came of it; `compensate`'s gains are changed in the page while a hand feels them.
 
 use std::fs;
-use std::path::{Path, PathBuf};
 use std::time::Duration;
 use tests::browser::{Chromium, Error, Page, Places, Program, check};
 
@@ -89,7 +88,7 @@ fn settle() -> Result<(), Error> {
     let scratch = places.scratch("page-settle")?;
     let browser = Chromium::start(&scratch)?;
     let plant = concat!(env!("CARGO_MANIFEST_DIR"), "/fixtures/hidden.toml");
-    let out = empty(&scratch, "settled")?;
+    let out = scratch.join("settled");
     let folder = out.to_str().ok_or("the target folder has a plain name")?;
     let settle = ["settle", "--page", "--port", "0", "--plant", plant, "--out", folder];
     let one_round = ["--rounds", "1", "--motion", "40", "--inputs", "characterise"];
@@ -123,15 +122,6 @@ fn settle() -> Result<(), Error> {
     program.ended()
 }
 
-/// A folder that is not there yet, whatever an earlier run of the test left.
-fn empty(scratch: &Path, name: &str) -> Result<PathBuf, Error> {
-    let folder = scratch.join(name);
-    if folder.exists() {
-        fs::remove_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
-    }
-    Ok(folder)
-}
-
 #[test]
 fn leaving_the_page_ends_settling_before_anything_moves() {
     if let Err(error) = leave_settling("page-settle-left", false) {
@@ -151,7 +141,7 @@ fn leave_settling(name: &str, while_it_plays: bool) -> Result<(), Error> {
     let scratch = places.scratch(name)?;
     let browser = Chromium::start(&scratch)?;
     let plant = concat!(env!("CARGO_MANIFEST_DIR"), "/fixtures/hidden.toml");
-    let out = empty(&scratch, "settled")?;
+    let out = scratch.join("settled");
     let folder = out.to_str().ok_or("the target folder has a plain name")?;
     let settle = ["settle", "--page", "--port", "0", "--plant", plant, "--out", folder];
     // The longest round there is, so that it still plays when it is left.

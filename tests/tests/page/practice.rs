@@ -25,10 +25,6 @@ fn attempts_are_judged_compared_and_recorded() {
 fn visit() -> Result<(), Error> {
     let places = Places::find()?;
     let scratch = places.scratch("page-practice")?;
-    // Recordings of an earlier run.
-    for name in ["monday.mcap", "monday-2.mcap"] {
-        let _ = std::fs::remove_file(scratch.join(name));
-    }
     let browser = Chromium::start(&scratch)?;
     let program =
         Program::start_in(&places.program, &scratch, &["run", "--port", "0", "--procedure", "venepuncture"])?;
