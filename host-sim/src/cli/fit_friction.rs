@@ -11,7 +11,8 @@ use std::path::PathBuf;
 /// Fit the LuGre friction of Paper 002 to a needle that goes to and fro in one block.
 ///
 /// Reads a recording of this program (MCAP), or CSV with the columns time_s, depth_mm and force_n,
-/// in which the needle turns round at least four times and moves slowly and fast. Writes the
+/// in which the needle turns round at least four times and moves slowly and fast; of several
+/// stretches of a recording it takes the longest. Writes the
 /// `[law.friction]` of a profile, each value with its 95 % interval.
 #[derive(Args)]
 #[command(after_help = examples!("Example: host-sim fit-friction gum.csv --out friction.toml"))]

@@ -22,7 +22,7 @@ const EVEN: f64 = 0.5;
 const MOST_HZ: f64 = 1_000.0;
 
 /// Larger than any force of a needle, N.
-const LARGEST_N: f64 = 60.0;
+pub(crate) const LARGEST_N: f64 = 60.0;
 /// A force at this distance from the skin or farther is the sensor's alone, mm.
 const REST_MM: f64 = 0.05;
 /// The largest of those, N and as a part of the forces inside.
@@ -112,10 +112,7 @@ fn check_force(file: &str, moments: &[Moment]) -> Result<(), Error> {
     let (low, high) = forces(true).fold((0.0_f64, 0.0_f64), |(l, h), f| (l.min(f), h.max(f)));
     let refused = |why: String| Err(Error::input(format_args!("{file}: {why}")));
     if (high - rest).max(rest - low) > LARGEST_N {
-        let far = if high > -low { high } else { low };
-        return refused(format!(
-            "force_n reaches {far:.0}, more than any needle meets in N; if it is in mN, divide it by 1000"
-        ));
+        return Err(too_large(file, if high > -low { high } else { low }));
     }
     if rest.abs() > REST_N.max(REST_PART * (high - low)) {
         return refused(format!(
@@ -129,6 +126,13 @@ fn check_force(file: &str, moments: &[Moment]) -> Result<(), Error> {
         );
     }
     Ok(())
+}
+
+/// Refuses a force of `far` N, beyond [`LARGEST_N`].
+pub(crate) fn too_large(file: &str, far: f64) -> Error {
+    Error::input(format_args!(
+        "{file}: force_n reaches {far:.0}, more than any needle meets in N; if it is in mN, divide it by 1000"
+    ))
 }
 
 fn from_recording(recording: &Recording) -> Vec<Vec<Moment>> {

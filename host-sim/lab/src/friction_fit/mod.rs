@@ -55,15 +55,21 @@ pub struct FrictionFit {
 }
 
 /// Fits LuGre friction to the recording at `path`, MCAP or CSV with `time_s`, `depth_mm` and
-/// `force_n`.
+/// `force_n`; where a recording has several stretches, to the longest.
 ///
 /// # Errors
 ///
-/// If the file cannot be read, the needle does not go to and fro often enough or at speeds that
-/// differ, or the force is not that of friction.
+/// If the file cannot be read, a force is larger than any needle's, the needle does not go to and
+/// fro often enough or at speeds that differ, or the force is not that of friction.
 pub fn fit(path: &Path) -> Result<FrictionFit, Error> {
     let shown = path.display();
-    let moments = insertions::moments(path, insertions::Angle::Ignored)?.concat();
+    let stretches = insertions::moments(path, insertions::Angle::Ignored)?;
+    // Each stretch has a time and bristles of its own.
+    let moments = stretches.into_iter().max_by_key(Vec::len).unwrap_or_default();
+    let furthest = moments.iter().map(|m| m.force_n).max_by(|a, b| a.abs().total_cmp(&b.abs()));
+    if let Some(far) = furthest.filter(|force| force.abs() > insertions::LARGEST_N) {
+        return Err(insertions::too_large(&shown.to_string(), far));
+    }
     let ways = ways(&moments);
     if ways.len() <= FEWEST_TURNS {
         return Err(Error::input(format_args!(

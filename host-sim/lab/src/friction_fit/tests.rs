@@ -65,6 +65,7 @@ fn what_tells_no_friction_is_refused() {
         ("turns", &speeds[..2], 0.3, "turns round 3 times"),
         ("alike", &[3.0, 4.0, 3.0][..], 0.3, "record slow and fast ones"),
         ("none", &speeds[..], 0.0, "not that of friction"),
+        ("in-mn", &speeds[..], 300.0, "divide it by 1000"),
     ] {
         let path = file(name, &to_and_fro(speeds), |direction| force * direction);
         let said = fit(&path).expect_err(why).to_string();
