@@ -105,10 +105,9 @@ impl EffectSearch for Defined {
         vec![("time_constant", 0.02 * span.duration, 5.0 * span.duration)]
     }
     fn limits(&self, _term: usize, allowed: &Allowed) -> (f64, f64) {
-        // At most this part of the smallest gain that the rig allows: a drive that drifts to
-        // nothing is no drift.
-        let least = 0.9 * allowed.gain.abs() / allowed.gain_reach;
-        (-least, least)
+        // The gain keeps its sign, whatever gain the rig allows: the smallest bounds its drift.
+        let smallest = allowed.gain.abs() / allowed.gain_reach;
+        (-smallest, smallest)
     }
     fn unnamed(&self, name: EffectName, fitted: Option<&Effect>, span: &Span) -> Vec<Unnamed> {
         if fitted.is_some_and(|effect| effect.name != name) {
