@@ -127,9 +127,9 @@ export class BodyView {
     return { depth, angle: angle ?? tilt - this.scene.skin_tilt_rad, origin: [originX, originY], flashback: vessel === "in_lumen" };
   }
 
-  /** A fixed step at 60 pictures a second; where pictures come slower, the tissue keeps up. */
+  /** Moves the tissue on by the time since the last picture; the first has none. */
   step(seconds) {
-    this.picture.step(Math.min(Math.max(seconds, 1 / 120), 1 / 20), this.needle());
+    this.picture.step(Math.max(seconds, 1 / 120), this.needle());
   }
 
   /** Moves the tissue on for a headset; what it draws. */

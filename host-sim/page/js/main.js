@@ -170,7 +170,7 @@ function draw(nowMs) {
   hand.tell();
   scrub.tell();
   compensationSlider.tell();
-  view.seconds = Math.min(0.1, (nowMs - lastDrawn) / 1000);
+  view.seconds = Math.min(0.25, (nowMs - lastDrawn) / 1000);
   lastDrawn = nowMs;
   view.hand = hand.depth;
   view.person = hand.person;

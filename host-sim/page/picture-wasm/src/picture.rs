@@ -14,6 +14,9 @@ use ultrasound::{Imager, InPlaneScore, Look, Medium, Mesh, Probe, Scene, Shaft};
 const PER_LAYER: usize = 4;
 /// Places along the insertion where the vessel's walls in the needle's plane are known.
 pub const SLICES: usize = 64;
+/// The time that one step of the tissue takes, and the longest that a picture moves it on, s.
+const STEP_S: f32 = 1.0 / 60.0;
+const LONGEST_S: f32 = 0.25;
 /// Width of the ultrasound image, mm.
 const IMAGE_WIDTH_MM: f32 = 24.0;
 /// Its smallest and largest depth, and how far it reaches below the innermost layer's top, mm.
@@ -162,11 +165,19 @@ impl Picture {
     /// Moves time on with the tip `depth_mm` along a needle at `angle` rad to the skin, whose line
     /// has depth 0 at `origin_mm` along the skin and below it: one that has turned in tissue turns
     /// about the point that holds it and not about its entry.
+    ///
+    /// Where pictures come slowly the needle goes from its last place to this one in steps of a
+    /// sixtieth of a second: a wall that is pushed by millimetres at once folds, and stays folded.
     pub fn step(&mut self, seconds: f32, depth_mm: f32, angle: f32, origin_mm: [f32; 2]) {
         let mut needle = Needle::entering(depth_mm, angle, 0.0);
         needle.tip[0] += origin_mm[0];
         needle.tip[2] += origin_mm[1];
-        self.tissue.step(&needle, seconds);
+        let seconds = seconds.clamp(0.0, LONGEST_S);
+        let steps = (seconds / STEP_S).round().max(1.0);
+        let last = Needle { tip: self.shaft.tip_mm, direction: self.shaft.direction };
+        for number in 1..=steps as u32 {
+            self.tissue.step(&last.towards(&needle, number as f32 / steps), seconds / steps);
+        }
         let moved = self.tissue.points();
         self.points[..moved.len()].copy_from_slice(moved);
         self.cut_vessel();

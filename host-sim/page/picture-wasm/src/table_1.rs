@@ -75,4 +75,29 @@ mod tests {
         assert_eq!(picture.wall_state(0), PunctureState::Inserted);
         assert!(picture.points().iter().flatten().all(|number| number.abs() < 100.0), "it holds together");
     }
+
+    /// The places of the particles after a needle went 16 mm in, in pictures of so many a second.
+    fn after_a_needle(pictures_per_s: f32) -> Vec<[f32; 4]> {
+        let mut picture = Picture::new(&phantom(1.0)).expect("it can be built");
+        let mut go = |seconds: f32, depth_mm: &dyn Fn(f32) -> f32| {
+            let pictures = (seconds * pictures_per_s) as usize;
+            for number in 1..=pictures {
+                let share = number as f32 / pictures as f32;
+                picture.step(1.0 / pictures_per_s, depth_mm(share), 0.44, [0.0; 2]);
+            }
+            picture.tell(0, PunctureState::Inserted);
+            picture.tell(1, PunctureState::Inserted);
+        };
+        go(1.0, &|share| -3.0 + 6.0 * share);
+        go(2.0, &|share| 3.0 + 13.0 * share);
+        go(3.0, &|_| 16.0);
+        picture.points().to_vec()
+    }
+
+    #[test]
+    fn slow_pictures_fold_no_wall() {
+        let (smooth, slow) = (after_a_needle(60.0), after_a_needle(4.0));
+        let apart_mm = smooth.iter().zip(&slow).map(|(a, b)| (a[2] - b[2]).abs()).fold(0.0, f32::max);
+        assert!(apart_mm < 0.3, "{apart_mm} mm");
+    }
 }

@@ -26,6 +26,13 @@ impl Needle {
         Self { tip: scale(direction, number(depth_mm).clamp(-500.0, 500.0)), direction }
     }
 
+    /// Returns the needle at a `share` of the way from this to another: 0 is this, 1 the other.
+    pub fn towards(&self, other: &Self, share: f32) -> Self {
+        let between = |from: Vector, to: Vector| add(from, scale(sub(to, from), share));
+        let ahead = between(self.direction, other.direction);
+        Self { tip: between(self.tip, other.tip), direction: direction(ahead).unwrap_or(other.direction) }
+    }
+
     /// The needle as it can be used: finite, its direction of length 1.
     pub(crate) fn checked(self) -> Option<Self> {
         let direction = direction(self.direction)?;
