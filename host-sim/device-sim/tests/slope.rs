@@ -58,3 +58,27 @@ fn a_barrier_stops_a_needle_that_is_turned() {
     device.control(Control::Tilt { rad: 1.2 });
     assert!((device.plant().tilt() - 1.2).abs() < 1e-9 && device.take_done().is_empty());
 }
+
+/// Another patient is chosen while the hand has the needle lowered: it is turned as the new patient
+/// says, 45°, and not by what it was lowered more.
+#[test]
+fn a_new_procedure_does_not_inherit_the_last_ones_turn() {
+    let adult = Profile::find("adult").expect("it is built in");
+    let find = |name| Procedure::find(name, &adult).expect("it is built in");
+    let mut device = VirtualDevice::new(&adult, find("cannulation"));
+    device.start_alone();
+    let entry = device.plant().tilt();
+    let lowered = (0..100_000).any(|_| {
+        device.tick_alone();
+        device.plant().tilt() < entry - 9_f64.to_radians()
+    });
+    assert!(lowered, "the procedure lowers the needle");
+    device.follow(find("venepuncture"));
+    device.control(Control::Tilt { rad: 45_f64.to_radians() });
+    (0..1_000).for_each(|_| device.tick_alone());
+    assert!(
+        (device.plant().tilt().to_degrees() - 45.0).abs() < 1e-6,
+        "{}",
+        device.plant().tilt().to_degrees()
+    );
+}

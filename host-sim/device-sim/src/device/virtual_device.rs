@@ -256,9 +256,10 @@ impl VirtualDevice {
         }
     }
 
-    /// The scripted hand does something else from now on, from its beginning; one that a person has
-    /// taken it from waits with it.
+    /// The scripted hand does something else from now on, from its beginning and with the needle
+    /// turned back; one that a person has taken it from waits with it.
     pub fn follow(&mut self, procedure: Procedure) {
+        self.turn(0.0);
         self.procedure = procedure;
         if matches!(self.hand, Hand::Script { .. }) {
             self.restart_script();
