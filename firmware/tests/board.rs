@@ -201,7 +201,7 @@ mod tests {
     #[timeout(20)]
     fn a_configuration_is_saved_and_found_again(parts: Parts) {
         let (timer, debug) = parts.chip.watchdog;
-        let watchdog = RefCell::new(Watchdog::start(timer, debug));
+        let watchdog = RefCell::new(Watchdog::start(timer, debug, Wires::ALIVE));
         let mut scratch = Fed { flash: Nor(parts.chip.flash.scratch()), watchdog };
         for slot in [Slot::A, Slot::B] {
             assert!(scratch.erase(slot).is_ok(), "erased before");

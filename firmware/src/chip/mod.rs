@@ -59,6 +59,9 @@ pub(crate) trait Wiring: 'static {
     const CEILINGS: Ceilings;
     /// The enable line past its owner.
     const ENABLE: Pin = <Self::Enable as Placed>::PIN;
+    /// The output that changes its level as often as the watchdog is fed, each millisecond, for a
+    /// monostable outside.
+    const ALIVE: Pin;
 
     /// Sets every pin up, the amplifier first; nothing is started and nothing written.
     fn init(core: cortex_m::Peripherals, device: Peripherals) -> Parts<Self>

@@ -55,6 +55,17 @@ impl Pin {
             .modify(|r, w| unsafe { w.bits(r.bits() & !(0b11 << place) | pull << place) });
     }
 
+    /// Changes the level of an output. Nobody else drives this pin; the write changes no other.
+    pub(crate) fn toggle(self) {
+        // SAFETY: a read without a side effect, and a bit that sets or clears this pin (RM0090
+        // 8.4.6, 8.4.7).
+        unsafe {
+            let is_high = (*self.registers()).odr().read().bits() >> self.number & 1 != 0;
+            let bit = 1 << (self.number + if is_high { 16 } else { 0 });
+            (*self.registers()).bsrr().write(|w| w.bits(bit));
+        }
+    }
+
     /// Drives it low, where it is an output; else it does nothing. A write that changes no other
     /// pin.
     pub(crate) fn set_low(self) {

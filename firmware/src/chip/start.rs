@@ -157,7 +157,7 @@ impl Chip {
         }
 
         let (timer, debug) = self.watchdog;
-        let watchdog = Watchdog::start(timer, debug);
+        let watchdog = Watchdog::start(timer, debug, W::ALIVE);
         let serial = usb::init(self.usb, serial_number(), statics);
         let mut systick = self.systick;
         systick.set_clock_source(cortex_m::peripheral::syst::SystClkSource::Core);

@@ -5,7 +5,7 @@ use control_core::interlock::Interlock;
 use control_core::units::MillinewtonMetres;
 use control_core::{Config, Device};
 use emulator::board::tilt::{Health, Model};
-use emulator::board::{Board, Effect, MILLISECOND, Nanos, Wiring, firmware_path, plant, record};
+use emulator::board::{Board, Effect, MILLISECOND, Nanos, Stopped, Wiring, firmware_path, plant, record};
 use fixed::types::I16F16;
 use link::Command;
 use link::frames::{CommandRefusal, EventKind};
@@ -240,6 +240,31 @@ fn a_usb_stack_that_hangs() {
 #[test]
 fn a_supervisor_that_hangs() {
     hung("supervisor hangs", task::SUPERVISOR);
+}
+
+/// A core that has come into an endless loop of its own, which feeds the watchdog in it, is never
+/// reset, and its enable line stays high: the monostable takes the torque away.
+#[test]
+fn a_wrong_program_that_feeds_its_watchdog() {
+    // `ldr r0, [pc, #4]`, `ldr r1, [pc, #8]`, `str r1, [r0]`, `b` back to it, the watchdog's key
+    // register and its key (RM0090 21.4.1).
+    const PROGRAM: [u32; 4] = [0x4902_4801, 0xE7FD_6001, 0x4000_3000, 0xAAAA];
+    const AT: u32 = 0x2002_0000;
+    let mut rig = Rig::pressed();
+    rig.board.at_stop(|stopped| {
+        for (at, word) in (AT..).step_by(4).zip(PROGRAM) {
+            assert!(stopped.set_word(at.into(), word), "memory for a program");
+        }
+    });
+    rig.upset(task::TICK, Effect::Jump(AT));
+    let begin = rig.board.now();
+    // Its converter keeps the code: only the amplifier is off.
+    let is_off = |stopped: &mut Stopped<'_>| !stopped.drive().enabled;
+    assert!(rig.board.run_until_seen(begin + 6 * MILLISECOND, TICK / 10, is_off), "the motor is driven");
+    report("wrong program that feeds its watchdog", rig.board.now() - begin);
+    rig.board.run_ms(100);
+    let (resets, line) = rig.board.at_stop(|stopped| (stopped.resets().len(), stopped.enable_line()));
+    assert!(resets == 0 && line, "{resets} resets, the enable line high: {line}");
 }
 
 #[test]

@@ -43,6 +43,7 @@ fn channel(pin: PartPin) -> u8 {
 fn check(section: &str, board: &Pins) {
     assert_eq!(pins(section, "encoder A, B"), board.tracks);
     assert_eq!(pins(section, "amplifier enable"), [board.enable]);
+    assert_eq!(pins(section, "alive"), [board.alive]);
     assert_eq!(pins(section, "emergency stop"), [board.drive_lines[0]]);
     assert_eq!(pins(section, "amplifier ready"), [board.drive_lines[1]]);
     let monitor = pins(section, "current monitor");

@@ -8,6 +8,7 @@
 //! | PD4 | codec reset | low, always |
 //! | PE8–PE15 | motor set value, 8 bit (DAC0800), PE8 the lowest bit | for a configuration that says so |
 //! | PD7 | amplifier enable, high is on | needs an external pull-down of 10 kΩ; read back |
+//! | PD6 | alive: changes its level each millisecond | to a monostable that holds the enable path |
 //! | PE4 | emergency stop: to 3 V while it may run | pulled down inside: a jumper to 3 V where there is no stop |
 //! | PE5 | amplifier ready: to 3 V while it is | pulled down inside: a jumper to 3 V where it has no such output |
 //! | PC2, PE6 | motor current, scaled as PA4 (ADC 2, channel 12); PE6 to 3 V where it is fitted | read at start-up |
@@ -18,13 +19,15 @@
 //! | PC0 | power switch of CN5, for a host; low is on | always high: this is a device (UM1472, OTG) |
 //! | PD12, PD13, PD14 | lamps: green, running; orange, torque is on; red, a fault | LD4, LD3, LD5 on the board |
 
-use crate::chip::{self, Begun, DriveLines, InclinometerPin, Lamps, Line, Parts, Source, Wired, Wiring};
+use crate::chip::{
+    self, Begun, DriveLines, InclinometerPin, Lamps, Line, Parts, Pin, Placed, Source, Wired, Wiring,
+};
 use control_core::ceilings::Ceilings;
 use embedded_hal_bus::spi::{ExclusiveDevice, NoDelay};
 use firmware::drive::Drive;
 use firmware::tilt::{Accelerometer, Inclinometer, Reading, TiltSource};
 use firmware::timing;
-use stm32f4xx_hal::gpio::{Analog, Output, PA5, PA6, PA7, PC1, PD7, PE3, PinState};
+use stm32f4xx_hal::gpio::{Analog, Output, PA5, PA6, PA7, PC1, PD6, PD7, PE3, PinState};
 use stm32f4xx_hal::pac;
 use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::rcc::Rcc;
@@ -40,6 +43,7 @@ impl Wiring for Discovery {
     /// 10 N at a roller of 10 mm, the most that Paper 002 asks for, and 0.6 m/s, half as fast again
     /// as the overspeed trip of a usual encoder. Another motor is another image.
     const CEILINGS: Ceilings = Ceilings::new(100, 600);
+    const ALIVE: Pin = <PD6 as Placed>::PIN;
 
     fn init(core: cortex_m::Peripherals, device: pac::Peripherals) -> Parts<Self> {
         let mut begun = Begun::new(device.RCC, Source::Crystal);
@@ -53,6 +57,7 @@ impl Wiring for Discovery {
         // The amplifier before anything else: off, then zero torque.
         let enable = chip::amplifier_off(gpiod.pd7);
         gpiod.pd4.into_push_pull_output().set_low();
+        gpiod.pd6.into_push_pull_output();
         // High before it is an output: low switches the host's 5 V on.
         gpioc.pc0.into_push_pull_output_in_state(PinState::High);
         let drive = Drive::new(chip::converters!(device, gpioa, gpioe, rcc), enable);

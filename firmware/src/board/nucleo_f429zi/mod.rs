@@ -10,6 +10,7 @@
 //! | PA4 | motor set value, 12 bit (DAC 1) | CN7 17 |
 //! | PE8–PE15 | motor set value, 8 bit (DAC0800), PE8 the lowest bit | CN10 18, 4, 24, 6, 26, 10, 28, 30 |
 //! | PF13 | amplifier enable, high is on | CN10 2; needs an external pull-down of 10 kΩ; read back |
+//! | PG9 | alive: changes its level each millisecond | CN10 16; to a monostable that holds the enable path |
 //! | PF14 | emergency stop: to 3.3 V while it may run | CN10 8; pulled down inside: a jumper to 3.3 V where there is no stop |
 //! | PF15 | amplifier ready: to 3.3 V while it is | CN10 12; pulled down inside: a jumper to 3.3 V where it has no such output |
 //! | PC2, PF12 | motor current, scaled as PA4 (ADC 2, channel 12); PF12 to 3.3 V where it is fitted | CN10 9, CN7 20; read at start-up |
@@ -18,11 +19,13 @@
 //! | PG6 | power switch of CN13, for a host | low, always: this is a device |
 //! | PB0, PB7, PB14 | lamps: green, running; blue, torque is on; red, a fault | LD1, LD2, LD3 on the board |
 
-use crate::chip::{self, Begun, DriveLines, InclinometerPin, Lamps, Line, Parts, Source, Wired, Wiring};
+use crate::chip::{
+    self, Begun, DriveLines, InclinometerPin, Lamps, Line, Parts, Pin, Placed, Source, Wired, Wiring,
+};
 use control_core::ceilings::Ceilings;
 use firmware::drive::Drive;
 use firmware::tilt::Inclinometer;
-use stm32f4xx_hal::gpio::{Analog, Output, PC0, PF13};
+use stm32f4xx_hal::gpio::{Analog, Output, PC0, PF13, PG9};
 use stm32f4xx_hal::pac;
 use stm32f4xx_hal::prelude::*;
 
@@ -35,6 +38,7 @@ impl Wiring for NucleoF429zi {
 
     /// As the Discovery's: 10 N at a roller of 10 mm, and 0.6 m/s. Another motor is another image.
     const CEILINGS: Ceilings = Ceilings::new(100, 600);
+    const ALIVE: Pin = <PG9 as Placed>::PIN;
 
     fn init(core: cortex_m::Peripherals, device: pac::Peripherals) -> Parts<Self> {
         // 8 MHz from the debugger's own microcontroller, which has to have power (UM1974, HSE
@@ -63,6 +67,7 @@ impl Wiring for NucleoF429zi {
         // they are the timer's.
         let tracks = (gpioa.pa15.into_pull_up_input(), gpiob.pb3.into_pull_up_input());
         let encoder = chip::encoder(device.TIM2, tracks, gpioe.pe7, rcc);
+        gpiog.pg9.into_push_pull_output();
         gpiog.pg6.into_push_pull_output().set_low();
         let lamps = Lamps::new(gpiob.pb0, gpiob.pb7, gpiob.pb14);
 

@@ -1,5 +1,6 @@
 //! The servo amplifier at the board's pins, and what goes wrong with it.
 
+use rigless::device::Level;
 use serde::{Deserialize, Serialize};
 
 use super::plant::Drive;
@@ -42,5 +43,30 @@ impl Amplifier {
         let drive = self.drive(asked);
         let code = if drive.enabled { drive.code.unwrap_or(2_048) } else { 2_048 };
         u32::from(code) * full_scale / 4_096
+    }
+}
+
+/// The connection of a line of the drive.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub(super) enum Contact {
+    /// The board's supply: the contact is closed.
+    Closed,
+    /// Nothing: it is open, or its wire is off.
+    Open,
+    /// Ground: its wire is shorted.
+    Ground,
+}
+
+impl Contact {
+    pub(super) fn level(self) -> Option<Level> {
+        match self {
+            Self::Closed => Some(Level::High),
+            Self::Open => None,
+            Self::Ground => Some(Level::Low),
+        }
+    }
+
+    pub(super) fn closed_if(is_closed: bool) -> Self {
+        if is_closed { Self::Closed } else { Self::Open }
     }
 }

@@ -17,6 +17,7 @@ pub mod flash;
 mod image_file;
 pub mod log;
 mod machine;
+mod monostable;
 pub mod otg;
 pub mod pins;
 pub mod plant;
@@ -49,6 +50,7 @@ use rigless::time::VirtualNanos;
 
 pub use amplifier::Amplifier;
 pub use bus::INSTRUCTIONS_PER_SECOND;
+pub use monostable::Monostable;
 pub use plant::{Drive, Nanos, PlantSide};
 pub use probe::{Counted, Effect, HandlerRun, Probe, ToCode};
 pub use snapshot::Saved;
@@ -132,6 +134,8 @@ pub struct Wiring {
     /// True if the converter's output is wired to the current monitor's input, as the board's own
     /// test asks for it.
     pub loopback: bool,
+    /// True if the amplifier's enable path goes through a [`Monostable`].
+    pub monostable: bool,
     /// The part's supply when it is switched on, in millivolts.
     pub supply: u32,
     /// The period of the plant, in nanoseconds.
@@ -152,6 +156,7 @@ impl Default for Wiring {
             supply_sense: false,
             current_monitor: false,
             loopback: false,
+            monostable: true,
             supply: machine::RAIL_MILLIVOLTS,
             plant_period: 20_000,
             commissioned: true,

@@ -52,6 +52,8 @@ pub struct Pins {
     pub clock: Clock,
     /// The amplifier's enable line, high is on.
     pub enable: PartPin,
+    /// The pin whose edges retrigger the monostable in the amplifier's enable path.
+    pub alive: PartPin,
     /// Tracks A and B of the encoder.
     pub tracks: [PartPin; 2],
     /// The pin that senses the encoder's supply.
@@ -78,6 +80,7 @@ pub const DISCOVERY: Pins = Pins {
     own_test: "own test: discovery",
     clock: Clock::Crystal,
     enable: PartPin::new('D', 7),
+    alive: PartPin::new('D', 6),
     tracks: [PartPin::new('A', 15), PartPin::new('A', 1)],
     encoder_supply: PartPin::new('E', 7),
     drive_lines: [PartPin::new('E', 4), PartPin::new('E', 5), PartPin::new('E', 6)],
@@ -94,6 +97,7 @@ pub const NUCLEO_F429ZI: Pins = Pins {
     own_test: "own test: nucleo-f429zi",
     clock: Clock::Elsewhere,
     enable: PartPin::new('F', 13),
+    alive: PartPin::new('G', 9),
     tracks: [PartPin::new('A', 15), PartPin::new('B', 3)],
     encoder_supply: PartPin::new('E', 7),
     drive_lines: [PartPin::new('F', 14), PartPin::new('F', 15), PartPin::new('F', 12)],

@@ -8,13 +8,13 @@ use rigless::soc::Width;
 use rigless::soc::stm32f427::peripherals::adc;
 use rigless::time::VirtualNanos;
 
-use super::amplifier::Amplifier;
+use super::amplifier::{Amplifier, Contact};
 use super::machine::{Machine, pin};
 use super::plant::{Drive, Nanos, PlantSide};
 use super::tilt::Accelerometer;
 use super::usb_port::UsbPort;
 use super::wires::Wires;
-use super::world::{Contact, Log, World};
+use super::world::{Log, World};
 
 /// The board between two instructions.
 pub struct Stopped<'a> {
@@ -92,6 +92,12 @@ impl Stopped<'_> {
     #[must_use]
     pub fn drive(&self) -> Drive {
         Drive { code: self.world.code, enabled: self.world.enabled }
+    }
+
+    /// True if the board's enable line is high, before the monostable.
+    #[must_use]
+    pub fn enable_line(&self) -> bool {
+        self.world.line
     }
 
     /// Returns true for each lamp that shines: running, torque is on, a fault.

@@ -8,9 +8,10 @@ use rigless::soc::stm32f427::peripherals::adc;
 use rigless::time::VirtualNanos;
 use serde::{Deserialize, Serialize};
 
-use super::amplifier::Amplifier;
+use super::amplifier::{Amplifier, Contact};
 use super::bus::DAC;
 use super::machine::{Machine, RAIL_MILLIVOLTS, pin};
+use super::monostable::Monostable;
 use super::pins::register;
 use super::plant::{Drive, Nanos, PlantSide};
 use super::tracks::{PULL_SETTLES, Tracks};
@@ -45,7 +46,7 @@ pub struct Log {
     pub put_out: Vec<Output>,
     /// Every read of the encoder's counter.
     pub encoder: Vec<EncoderRead>,
-    /// Every change of the amplifier's enable line, with what it became.
+    /// Every change of the amplifier's enable input, behind the monostable, with what it became.
     pub enable: Vec<(Nanos, bool)>,
     /// The output of the RTT terminal.
     pub rtt: Vec<u8>,
@@ -59,31 +60,6 @@ pub(super) struct Symbols {
     pub(super) stack: Option<(u64, u64)>,
 }
 
-/// The connection of a line of the drive.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub(super) enum Contact {
-    /// The board's supply: the contact is closed.
-    Closed,
-    /// Nothing: it is open, or its wire is off.
-    Open,
-    /// Ground: its wire is shorted.
-    Ground,
-}
-
-impl Contact {
-    fn level(self) -> Option<Level> {
-        match self {
-            Self::Closed => Some(Level::High),
-            Self::Open => None,
-            Self::Ground => Some(Level::Low),
-        }
-    }
-
-    pub(super) fn closed_if(is_closed: bool) -> Self {
-        if is_closed { Self::Closed } else { Self::Open }
-    }
-}
-
 /// The surroundings of the part.
 pub(super) struct World {
     pub(super) wiring: Wiring,
@@ -94,7 +70,10 @@ pub(super) struct World {
     next_drain: Nanos,
     /// The time to which the board runs.
     pub(super) target: Nanos,
+    /// The board's enable line, and the amplifier's enable input behind the monostable.
+    pub(super) line: bool,
     pub(super) enabled: bool,
+    monostable: Monostable,
     pub(super) code: Option<u16>,
     latch_at: Option<Nanos>,
     /// The time at which the pull-down has drained the strap's pin.
@@ -114,7 +93,9 @@ rigless::store!(World {
         next_step,
         next_drain,
         target,
+        line,
         enabled,
+        monostable,
         code,
         latch_at,
         strap_settles,
@@ -143,7 +124,9 @@ impl World {
             next_step: 0,
             next_drain: 0,
             target: 0,
+            line: false,
             enabled: false,
+            monostable: Monostable::default(),
             code: None,
             latch_at: None,
             strap_settles: None,
@@ -186,6 +169,7 @@ impl World {
         if self.next_step <= at {
             self.tracks.glitch(session, at);
             self.next_step = at + self.wiring.plant_period;
+            self.enable(at);
             let asked = Drive { code: self.code, enabled: self.enabled };
             let drive = self.amplifier.drive(asked);
             if self.wiring.current_monitor || self.wiring.loopback {
@@ -210,14 +194,22 @@ impl World {
     }
 
     pub(super) fn watch_enable(&mut self, session: &mut Session<Machine>, at: Nanos) {
-        let place = self.wiring.pins.enable;
-        let (gpio, registers) = session.board_mut().part().port(place.port);
-        // The external pull-down holds the line while the pin doesn't drive it.
-        let level = gpio.level(pin(place.index), registers) == Level::High;
-        let level = self.amplifier.line(level);
-        if level != self.enabled {
-            self.enabled = level;
-            self.log.enable.push((at, level));
+        let [line, alive] = [self.wiring.pins.enable, self.wiring.pins.alive].map(|place| {
+            let (gpio, registers) = session.board_mut().part().port(place.port);
+            // External pull-downs hold the lines while the pins don't drive them.
+            gpio.level(pin(place.index), registers) == Level::High
+        });
+        self.monostable.see(alive, at);
+        self.line = self.amplifier.line(line);
+        self.enable(at);
+    }
+
+    /// The amplifier's enable input at `at`.
+    fn enable(&mut self, at: Nanos) {
+        let enabled = self.line && (!self.wiring.monostable || self.monostable.holds(at));
+        if enabled != self.enabled {
+            self.enabled = enabled;
+            self.log.enable.push((at, enabled));
         }
     }
 
