@@ -5,6 +5,11 @@ use super::{Chromium, Error, PATIENCE};
 use serde_json::{Value, json};
 use std::time::{Duration, Instant};
 
+/// A picture in 80 ms or more: drawn without a graphics card it takes a core at 60 a second, and a
+/// test that reads what the page says needs no more of them.
+const FEW_PICTURES: &str = "{ const ask = requestAnimationFrame;
+    window.requestAnimationFrame = (draw) => setTimeout(() => ask(draw), 80); }";
+
 /// A page in a tab of its own.
 pub struct Page {
     devtools: DevTools,
@@ -12,8 +17,26 @@ pub struct Page {
 }
 
 impl Page {
-    /// Opens `url` in a view of `width` by `height` CSS pixels; a phone has fingers.
+    /// Opens `url` in a view of `width` by `height` CSS pixels, in which few pictures are drawn; a
+    /// phone has fingers.
     pub fn open(browser: &Chromium, url: &str, width: u32, height: u32, phone: bool) -> Result<Self, Error> {
+        let mut page = Self::blank(browser, width, height, phone)?;
+        page.before_load(FEW_PICTURES)?;
+        page.go(url)
+    }
+
+    /// The same with as many pictures as the browser can draw.
+    pub fn open_lively(
+        browser: &Chromium,
+        url: &str,
+        width: u32,
+        height: u32,
+        phone: bool,
+    ) -> Result<Self, Error> {
+        Self::blank(browser, width, height, phone)?.go(url)
+    }
+
+    fn blank(browser: &Chromium, width: u32, height: u32, phone: bool) -> Result<Self, Error> {
         let mut devtools = browser.devtools()?;
         devtools.open_tab()?;
         for domain in ["Page", "Runtime", "Log", "Network"] {
@@ -21,8 +44,12 @@ impl Page {
         }
         let mut page = Self { devtools, complaints: Vec::new() };
         page.resize(width, height, phone)?;
-        page.devtools.call("Page.navigate", json!({ "url": url }))?;
         Ok(page)
+    }
+
+    fn go(mut self, url: &str) -> Result<Self, Error> {
+        self.devtools.call("Page.navigate", json!({ "url": url }))?;
+        Ok(self)
     }
 
     /// Runs a script before every load of the page from now on.

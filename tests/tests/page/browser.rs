@@ -42,7 +42,7 @@ fn visit() -> Result<(), Error> {
     let browser = Chromium::start(&scratch)?;
     let recording = scratch.join("watched.mcap");
     let mut program = Program::start(&places.program, 0, Some(&recording))?;
-    let mut page = Page::open(&browser, &program.url, DESKTOP.0, DESKTOP.1, false)?;
+    let mut page = Page::open_lively(&browser, &program.url, DESKTOP.0, DESKTOP.1, false)?;
     let mut rows = watch(&mut page, &browser)?;
     photographs(&mut page, &scratch)?;
     drag(&mut page)?;
@@ -95,7 +95,7 @@ fn come_back(page: &mut Page, program: &mut Program, path: &Path) -> Result<(), 
 
 /// A phone: nothing sticks out, the stop is in reach, a finger drags.
 fn phone(browser: &Chromium, url: &str, told: &str, scratch: &Path) -> Result<(), Error> {
-    let mut page = Page::open(browser, url, PHONE.0, PHONE.1, true)?;
+    let mut page = Page::open_lively(browser, url, PHONE.0, PHONE.1, true)?;
     page.wait("live data", "document.body.dataset.link === 'live' && !isNaN(__stats.firstFrameMs)")?;
     let told_later = page.text(FIRST_PUNCTURE)?;
     check("what happened before it was opened, in the same words", told == told_later, (told, &told_later))?;
