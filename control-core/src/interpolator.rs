@@ -41,7 +41,8 @@ impl Interpolator {
         let whole = count.to_bits() << 14;
         self.part = if depth == self.depth {
             let step = saturating_product(steady, PER_TICK_Q24, 24);
-            self.part.saturating_add(step).clamp(0, whole)
+            // Not `clamp`, which panics where the bounds are the wrong way round.
+            self.part.saturating_add(step).min(whole).max(0)
         } else if depth > self.depth {
             0
         } else {

@@ -72,7 +72,8 @@ fn exp2_q30(fraction_q32: i32) -> i32 {
 pub(crate) fn share(part: i32, whole: i32) -> i32 {
     let whole = whole.max(1).cast_unsigned();
     let places = whole.leading_zeros();
-    let (part, whole) = (part.max(0).cast_unsigned() << places, (whole << places) >> 16);
+    // Its highest bit is set already; said so, the divisions need no check.
+    let (part, whole) = (part.max(0).cast_unsigned() << places, (whole << places) >> 16 | 1 << 15);
     let first = part / whole;
     let rest = ((part - first * whole) << 12) / whole;
     ((first << 12) + rest).min(1 << 28).cast_signed()

@@ -323,7 +323,8 @@ impl Memory {
         let was_beyond = self.is_beyond;
         let bound = if was_beyond { (largest * REARMED_256) >> 8 } else { largest };
         self.is_beyond = off.abs() > bound;
-        let lateral = off.clamp(-largest, largest) * fixture.per_mrad.0.to_bits();
+        // Not `clamp`, which panics where the bounds are the wrong way round.
+        let lateral = off.min(largest).max(-largest) * fixture.per_mrad.0.to_bits();
         (Newtons(I16F16::from_bits(lateral)), self.is_beyond && !was_beyond)
     }
 }
