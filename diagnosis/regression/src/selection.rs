@@ -1,9 +1,11 @@
 //! Forward selection on left-out frames of the fit: the law with the largest share goes in.
 
-use crate::constants::{LEAST_SHARE, LINE_STEPS, NEXT_WAVE, REFINED, RIVALS, ROUNDS, SIZES_AGREE, WAVES};
+use crate::constants::{
+    INERTIA_REACH, LEAST_SHARE, LINE_STEPS, NEXT_WAVE, REFINED, RIVALS, ROUNDS, SIZES_AGREE, WAVES,
+};
 use crate::evidence::{Evidence, HeldOut, compare, over_error};
 use crate::fit::{Fitted, Model, agreement, expanded};
-use crate::laws::{self, ActsOn, Law, Shape, Size};
+use crate::laws::{self, ActsOn, Law, Quantity, Shape};
 use crate::problem::{Candidate, Problem};
 use numerics::golden_section::golden;
 use numerics::parallel;
@@ -230,13 +232,27 @@ impl Search {
         Scored { candidate, share, gains, agreement, coefficients, valid }
     }
 
-    fn has_its_size(&self, new: &Candidate, size: f64) -> bool {
-        let within = |unit: f64, low: f64, high: f64| size > low * unit && size < high * unit;
-        match new.law.size {
-            Size::Any => true,
-            Size::Positive => size > 0.0,
-            Size::OfShape(low, high) => within(new.shapes[0].value, low, high),
-            Size::OfInertia(low, high) => within(self.problem.machine.rig.inertia.nominal, low, high),
+    /// True if the first coefficient, the force that the drive supplies, is within its bounds.
+    fn has_its_size(&self, new: &Candidate, coefficient: f64) -> bool {
+        let inertia = self.problem.machine.rig.inertia.nominal;
+        let bounds = new.law.bounds_of(0);
+        let within = |x: f64, low: f64, high: f64| x > low && x < high;
+        let within_bounds = |x: f64| within(x, bounds.low, bounds.high);
+        match bounds.of {
+            Quantity::One => within_bounds(coefficient),
+            Quantity::Shape => within_bounds(coefficient / new.shapes[0].value),
+            Quantity::Jumps => within_bounds(coefficient / inertia),
+            Quantity::MotorInertia => {
+                let part = |ratio: f64| ratio / (1.0 + ratio);
+                let (low, high) = (part(bounds.low) / INERTIA_REACH, part(bounds.high) * INERTIA_REACH);
+                within(coefficient / inertia, low, high)
+            }
+            // Of the force that the motion asks for; as a part of the drive's it is less.
+            Quantity::SmallestGain | Quantity::LargestGain | Quantity::TrustedGain => {
+                within_bounds(coefficient / (1.0 + coefficient.abs()))
+            }
+            // The friction is fitted beside the law, from another moment or mean than the filter's.
+            Quantity::TwiceViscous | Quantity::TwiceDry | Quantity::LargestDry => true,
         }
     }
 

@@ -3,7 +3,7 @@
 //! part can be identified.
 
 use super::definition::{
-    Allowed, EffectLaw, EffectReport, EffectSearch, FREE, Fitted, ForceLaw, Plain, Reported, Span,
+    EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Plain, Reported, Span,
 };
 use super::joint_terms::JointTerms;
 use super::law::{first_or_both, sign};
@@ -80,10 +80,6 @@ impl EffectSearch for Defined {
         }
         let known = [("viscous_only", 1.0)];
         vec![Effect::shaped(name, if span.rig.has_offset { &known } else { &[] })]
-    }
-    fn limits(&self, term: usize, allowed: &Allowed) -> (f64, f64) {
-        let most = if term == 0 { allowed.viscous } else { allowed.dry };
-        most.map_or(FREE, |most| (-most, most))
     }
     fn freedom(&self, _effect: &Effect, _recordings: usize) -> usize {
         2

@@ -1,7 +1,7 @@
 //! A gap between motor and load that opens at reversals; the law is in `load`.
 
 use super::definition::{
-    Allowed, Coupling, EffectLaw, EffectReport, EffectSearch, Factors, Fitted, ForceLaw, Movable, Reported, Span,
+    Coupling, EffectLaw, EffectReport, EffectSearch, Factors, Fitted, ForceLaw, Movable, Reported, Span,
 };
 use super::joint_terms::JointTerms;
 use super::load::{Load, MOST_OF_DRY, Machine, RATIOS, gap_of, own_friction};
@@ -90,10 +90,6 @@ impl EffectSearch for Defined {
     }
     fn is_possible(&self, effect: &Effect) -> bool {
         own_friction(effect) <= MOST_OF_DRY * Machine::of(effect).dry
-    }
-    fn limits(&self, _term: usize, allowed: &Allowed) -> (f64, f64) {
-        let gain = allowed.gain;
-        ((8.0 * gain).min(0.1 * gain), (8.0 * gain).max(0.1 * gain))
     }
     fn start_factors(&self) -> &'static [Factors] {
         &[("gap", &[0.6, 1.0, 1.6]), ("coast", &[0.5, 1.0, 1.7]), ("ratio", &[0.6, 1.0, 1.7])]

@@ -1,7 +1,7 @@
 //! A spring between motor and load, seen as a resonance: what a rigid model misses of two masses.
 
 use super::definition::{
-    Allowed, Coupling, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Movable, Reported,
+    Coupling, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Movable, Reported,
     Span,
 };
 use super::shape::{ShapeKey, shape};
@@ -106,10 +106,6 @@ impl EffectSearch for Defined {
     }
     fn movable(&self, _effect: &Effect, span: &Span) -> Vec<Movable> {
         vec![("resonance_hz", 4.0, highest(span)), ("damping", 0.003, 0.7)]
-    }
-    fn limits(&self, _term: usize, allowed: &Allowed) -> (f64, f64) {
-        let gain = allowed.gain;
-        ((6.0 * gain).min(0.0), (6.0 * gain).max(0.0))
     }
 }
 

@@ -2,7 +2,7 @@
 //! viscous·q̇)·(1 - exp(-t/time_constant))`.
 
 use super::definition::{
-    Allowed, EffectLaw, EffectReport, EffectSearch, FREE, Fitted, ForceLaw, Movable, Reported, Span,
+    EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Movable, Reported, Span,
 };
 use super::law::{first_or_both, sign};
 use super::shape::{ShapeKey, shape};
@@ -71,16 +71,6 @@ impl EffectSearch for Defined {
     }
     fn movable(&self, _effect: &Effect, span: &Span) -> Vec<Movable> {
         vec![("time_constant", 0.02 * span.duration, 5.0 * span.duration)]
-    }
-    fn limits(&self, term: usize, allowed: &Allowed) -> (f64, f64) {
-        // What warms changes both frictions alike; how much of the friction as it is may go or come
-        // is judged where that is known.
-        let most = match (term, allowed.viscous, allowed.dry) {
-            (1.., Some(viscous), _) => viscous,
-            (_, _, Some(_)) => allowed.dry_by_uncertainty,
-            _ => return FREE,
-        };
-        (-0.9 * most, 3.0 * most)
     }
     fn freedom(&self, _effect: &Effect, _recordings: usize) -> usize {
         2

@@ -6,7 +6,7 @@
 //! speaks only against others.
 
 use super::definition::{
-    Allowed, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Movable, Reported, Span, Unnamed,
+    EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Movable, Reported, Span, Unnamed,
 };
 use super::shape::{ShapeKey, shape};
 use super::{Effect, EffectName, State, experiments};
@@ -103,12 +103,6 @@ impl EffectSearch for Defined {
     }
     fn movable(&self, _effect: &Effect, span: &Span) -> Vec<Movable> {
         vec![("time_constant", 0.02 * span.duration, 5.0 * span.duration)]
-    }
-    fn limits(&self, _term: usize, allowed: &Allowed) -> (f64, f64) {
-        // At most this part of the smallest gain that the rig allows: a drive that drifts to
-        // nothing is no drift.
-        let least = 0.9 * allowed.gain.abs() / allowed.gain_reach;
-        (-least, least)
     }
     fn unnamed(&self, name: EffectName, fitted: Option<&Effect>, span: &Span) -> Vec<Unnamed> {
         if fitted.is_some_and(|effect| effect.name != name) {

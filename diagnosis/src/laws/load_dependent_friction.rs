@@ -1,7 +1,7 @@
 //! Dry friction that grows with the measured external load: `-coefficient·|force|·sgn(q̇)`.
 
 use super::definition::{
-    Allowed, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, POSITIVE, Reported, Span,
+    EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Reported, Span,
 };
 use super::law::sign;
 use super::{Effect, EffectName, State};
@@ -35,9 +35,6 @@ impl EffectLaw for Defined {
 impl EffectSearch for Defined {
     fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
         if span.force { vec![Effect::shaped(name, &[])] } else { Vec::new() }
-    }
-    fn limits(&self, _term: usize, _allowed: &Allowed) -> (f64, f64) {
-        POSITIVE
     }
 }
 

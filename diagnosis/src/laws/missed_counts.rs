@@ -1,7 +1,7 @@
 //! Counts that the encoder loses permanently: steps of what it reads. The steps are found before
 //! any effect is.
 
-use super::definition::{Allowed, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Reported, Span};
+use super::definition::{EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Reported, Span};
 use super::shape::{Missing, ShapeKey};
 use super::{Effect, EffectName, State};
 
@@ -54,9 +54,6 @@ impl EffectLaw for Defined {
 impl EffectSearch for Defined {
     fn grid(&self, name: EffectName, _span: &Span) -> Vec<Effect> {
         vec![Effect::shaped(name, &[])]
-    }
-    fn limits(&self, _term: usize, _allowed: &Allowed) -> (f64, f64) {
-        (0.5, 1.5)
     }
 }
 

@@ -2,7 +2,7 @@
 //! beyond `from`; with `fades_s` it creeps, which has no name and speaks only against others.
 
 use super::definition::{
-    Allowed, EffectLaw, EffectReport, EffectSearch, FREE, Fitted, ForceLaw, Movable, POSITIVE, Plain,
+    EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Movable, Plain,
     Reported, Span, Unnamed,
 };
 use super::joint_terms::JointTerms;
@@ -98,9 +98,6 @@ impl EffectSearch for Defined {
     }
     fn movable(&self, _effect: &Effect, _span: &Span) -> Vec<Movable> {
         Vec::new()
-    }
-    fn limits(&self, term: usize, _allowed: &Allowed) -> (f64, f64) {
-        if term > 0 { FREE } else { POSITIVE }
     }
     fn freedom(&self, effect: &Effect, _recordings: usize) -> usize {
         1 + usize::from(Shape::of(effect).preload)

@@ -3,7 +3,7 @@
 
 use super::bristles::{Bristles, Shape, lengths};
 use super::definition::{
-    Allowed, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Movable, POSITIVE, Reported,
+    EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Movable, Reported,
     Span,
 };
 use super::joint_terms::{self, JointTerms};
@@ -76,9 +76,6 @@ impl EffectSearch for Defined {
     }
     fn movable(&self, _effect: &Effect, span: &Span) -> Vec<Movable> {
         vec![("deflection", 0.5 * span.count, 0.1 * span.travel())]
-    }
-    fn limits(&self, _term: usize, _allowed: &Allowed) -> (f64, f64) {
-        POSITIVE
     }
     fn bends_at_reversals(&self) -> bool {
         true

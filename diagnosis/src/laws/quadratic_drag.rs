@@ -1,7 +1,7 @@
 //! Drag with the square of speed: `-coefficient·q̇·|q̇|`.
 
 use super::definition::{
-    Allowed, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, POSITIVE, Reported, Span,
+    EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Reported, Span,
 };
 use super::{Effect, EffectName, State, Variable};
 
@@ -34,9 +34,6 @@ impl EffectLaw for Defined {
 impl EffectSearch for Defined {
     fn grid(&self, name: EffectName, _span: &Span) -> Vec<Effect> {
         vec![Effect::shaped(name, &[])]
-    }
-    fn limits(&self, _term: usize, _allowed: &Allowed) -> (f64, f64) {
-        POSITIVE
     }
 }
 

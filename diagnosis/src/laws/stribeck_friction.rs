@@ -2,7 +2,7 @@
 //! (Stribeck 1902; Bo and Pavelescu 1982).
 
 use super::definition::{
-    Allowed, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Movable, POSITIVE, Reported,
+    EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Movable, Reported,
     Span,
 };
 use super::joint_terms::{Drop, JointTerms};
@@ -74,9 +74,6 @@ impl EffectSearch for Defined {
     }
     fn movable(&self, _effect: &Effect, span: &Span) -> Vec<Movable> {
         vec![("speed", 0.002 * span.speed, span.speed), ("exponent", 0.7, 2.3)]
-    }
-    fn limits(&self, _term: usize, _allowed: &Allowed) -> (f64, f64) {
-        POSITIVE
     }
 }
 

@@ -1,7 +1,7 @@
 //! Friction that grows with speed, where the nominal model has none: `-viscous·q̇`.
 
 use super::definition::{
-    Allowed, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, NominalTerm, POSITIVE, Plain, Reported,
+    EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, NominalTerm, Plain, Reported,
     Span,
 };
 use super::joint_terms::JointTerms;
@@ -43,9 +43,6 @@ impl EffectLaw for Defined {
 impl EffectSearch for Defined {
     fn grid(&self, name: EffectName, _span: &Span) -> Vec<Effect> {
         vec![Effect::shaped(name, &[])]
-    }
-    fn limits(&self, _term: usize, _allowed: &Allowed) -> (f64, f64) {
-        POSITIVE
     }
     fn plain(&self, _effect: &Effect) -> Option<Plain> {
         Some(Plain { rank: 1, has_twin: false })

@@ -14,7 +14,7 @@ mod two_mass;
 mod waves;
 
 pub(crate) use command::{asked_by_motion, large_of};
-pub use record::{Need, RECORDS, Record, Subsystem, Within};
+pub use record::{Bounds, Need, Quantity, RECORDS, Record, Subsystem, Within};
 pub use states::{Scales, States};
 
 use crate::data::Rig;
@@ -26,19 +26,6 @@ pub enum ActsOn {
     Motion,
     /// The force that the motion asks of the drive; never the recorded command.
     Command,
-}
-
-/// The values that a law's coefficient may have.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Size {
-    /// Anything.
-    Any,
-    /// Positive.
-    Positive,
-    /// Between two multiples of the shape's own value: the coefficient has the shape's unit.
-    OfShape(f64, f64),
-    /// Between two multiples of the inertia.
-    OfInertia(f64, f64),
 }
 
 /// One member of a law's family.

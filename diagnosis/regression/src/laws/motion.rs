@@ -169,7 +169,8 @@ fn spring(m: &Machine, i: usize, shape: &Shape) -> Vec<Vec<f64>> {
     match shape.form {
         "straight" => vec![m.states[i].each(|k| m.states[i].q[k] / m.scales.half_travel)],
         "cubic" => vec![x.clone(), x.iter().map(|x| x.powi(3)).collect()],
-        _ => vec![x.iter().map(|x| (shape.value * x).max(0.0)).collect()],
+        // Pulls back on its side.
+        _ => vec![x.iter().map(|x| shape.value * (shape.value * x).max(0.0)).collect()],
     }
 }
 

@@ -89,6 +89,17 @@ fn a_bristle_bends_exponentially_after_a_reversal() {
 }
 
 #[test]
+fn a_spring_of_positive_size_pulls_back_on_either_side() {
+    let m = machine(|t| 8.0 * (2.0 * t).sin(), |_| 0.0);
+    for side in [1.0, -1.0] {
+        let force = &column(&m, "position_spring", "one side", side)[0];
+        for (force, q) in force.iter().zip(&m.states[0].q) {
+            assert!(force * q >= 0.0 && (*force != 0.0) == (q * side > 0.0), "{side}: {force} at {q}");
+        }
+    }
+}
+
+#[test]
 fn eccentricity_is_the_force_of_the_reading_error() {
     let q = |t: f64| 3.0 * t + 0.4 * (2.0 * t).sin();
     let m = machine(q, |_| 0.0);
