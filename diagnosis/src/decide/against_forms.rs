@@ -58,7 +58,7 @@ impl Densities {
 }
 
 /// True if the gain of a form is sure and large enough to be reported.
-pub(crate) fn is_told(taken: &Taken, tracks: &[BlockedRecording]) -> bool {
+pub(crate) fn is_reportable(taken: &Taken, tracks: &[BlockedRecording]) -> bool {
     let blocks: usize = tracks.iter().map(BlockedRecording::block_count).sum();
     taken.gain.is_sure() && taken.gain.sum > 0.5 * FORM_TOLD * blocks as f64
 }

@@ -2,7 +2,7 @@
 //! that the named law acts on, and what the law takes of it.
 
 use crate::decide::weighed_model::WeighedModel;
-use crate::evidence::comparison::Shown;
+use crate::evidence::comparison::ModelComparison;
 use crate::evidence::effect_evidence::Rival;
 use crate::evidence::law_band::{Band, Reach};
 use crate::evidence::residual_maps::variable as variable_of;
@@ -85,9 +85,9 @@ struct Row {
 pub(crate) fn nearest_rival<'a>(
     name: EffectName,
     weighed: &'a WeighedModel,
-    shown: &Shown,
-    fitted: impl Fn(Model) -> Shown,
-) -> Option<(&'a Rival, Shown)> {
+    shown: &ModelComparison,
+    fitted: impl Fn(Model) -> ModelComparison,
+) -> Option<(&'a Rival, ModelComparison)> {
     let found = &weighed.effects.iter().find(|one| one.found.effect.name == name)?.found;
     let mut model = shown.patched.model.clone();
     let is_new = |rival: &&Rival| model.effects.iter().all(|effect| effect.name != rival.name);
@@ -98,10 +98,10 @@ pub(crate) fn nearest_rival<'a>(
 
 /// The residuals that a picture is made of.
 pub(crate) struct Residual<'a> {
-    pub(crate) shown: &'a Shown,
+    pub(crate) shown: &'a ModelComparison,
     /// On the fitted recordings.
     pub(crate) band: Band,
-    pub(crate) rival: Option<(&'a Rival, Shown)>,
+    pub(crate) rival: Option<(&'a Rival, ModelComparison)>,
     pub(crate) fit: &'a [BlockedRecording],
     pub(crate) holdout: &'a [BlockedRecording],
     pub(crate) estimator: &'a Estimator,

@@ -9,8 +9,8 @@ use crate::evidence::residuals::{drive_force, forces};
 use crate::fit::force_residual::Estimator;
 use crate::fit::linear_fit::Fit;
 use crate::fit::model::Model;
-use crate::fit::nominal::{Kept, Key};
-use crate::laws::definition::Shown;
+use crate::fit::nominal::{InertiaSource, Key};
+use crate::laws::definition::ExcitationLimits;
 use crate::laws::{Effect, EffectName};
 use crate::propose::excitation::Excitation;
 use crate::propose::untested::{self, NotTested};
@@ -72,11 +72,11 @@ pub(crate) fn check(rig: &Rig, checked: &Checked, prepared: &Prepared) -> Check 
         recordings: all.map(|one| seen(one, rig)).collect(),
         faults: checked.faults.clone(),
         late_rows: prepared.nominal.skew_rows,
-        is_inertia_hidden: prepared.nominal.kept_inertia == Some(Kept::OfRig)
+        is_inertia_hidden: prepared.nominal.kept_inertia == Some(InertiaSource::OfRig)
             || prepared.nominal.virtual_inertia > 0.0,
         excitation,
         alike: alike(&fit),
-        twins: twins(&prepared.shown(&prepared.fit), &untested),
+        twins: twins(&prepared.limits(&prepared.fit), &untested),
         untested,
         left: left / force,
         noise: noise / force,
@@ -125,7 +125,7 @@ fn alike(fit: &Fit) -> Vec<(&'static str, &'static str, f64)> {
 }
 
 /// Effects that are tested and have the same shape in all such motion.
-fn twins(shown: &Shown, untested: &[(EffectName, NotTested)]) -> Vec<[EffectName; 2]> {
+fn twins(shown: &ExcitationLimits, untested: &[(EffectName, NotTested)]) -> Vec<[EffectName; 2]> {
     let is_tested =
         |name: &EffectName| name.definition().is_sought() && untested.iter().all(|(other, _)| other != name);
     let mut pairs: Vec<[EffectName; 2]> = Vec::new();

@@ -120,7 +120,7 @@ impl<'a> JudgedModel<'a> {
         shown: &'a [BlockedRecording],
     ) -> Self {
         let null = Fit::new(&Model::default(), context.nominal, context.tracks, &last.noise);
-        let null = FittedModel { model: Model::default(), noise: last.noise, fit: null, merit: 0.0 };
+        let null = FittedModel { model: Model::default(), noise: last.noise, fit: null, log_score: 0.0 };
         let estimator = Estimator::new(context.tracks, &last.noise, context.scale);
         let left = |model: &FittedModel| left_force(context, &estimator, shown, model, &last.noise);
         let inertia = parameters::scale(context.nominal, last).0;
@@ -157,7 +157,7 @@ impl<'a> JudgedModel<'a> {
         let mut less = last.model.clone();
         let effect = less.effects.remove(i);
         let fit = Fit::new(&less, context.nominal, context.tracks, &last.noise);
-        let without = FittedModel { model: less, noise: last.noise, fit, merit: 0.0 };
+        let without = FittedModel { model: less, noise: last.noise, fit, log_score: 0.0 };
         let without_fit = left_out_costs(&without.fit);
         let gains: Vec<f64> = without_fit.iter().zip(&self.on_fit).map(|(a, b)| a - b).collect();
         let evaluated = evaluate_all(&without, context.nominal, judging, &last.noise);
@@ -251,7 +251,7 @@ fn score_z_of(
     // The residual, and what the model pays, on fitted and on held-out recordings.
     let left = |model: &Model| {
         let fit = Fit::new(model, context.nominal, context.tracks, noise);
-        let fitted = FittedModel { model: model.clone(), noise: *noise, fit, merit: 0.0 };
+        let fitted = FittedModel { model: model.clone(), noise: *noise, fit, log_score: 0.0 };
         let evaluated = evaluate_all(&fitted, context.nominal, holdout, noise);
         let on_holdout: Vec<f64> = evaluated.iter().flat_map(|one| one.residual.iter().copied()).collect();
         let paid: f64 = fitted.fit.prepared.iter().map(Prepared::surcharge).sum();

@@ -10,8 +10,8 @@ use crate::fit::linear_fit::{Fit, Prepared};
 use crate::fit::model::{Model, total};
 use crate::fit::nominal::{Key, Nominal};
 use crate::propose::context::FittedModel;
-use crate::propose::joint;
 use crate::propose::predictive::{FOLDS, fold_of};
+use crate::propose::two_mass;
 use numerics::bootstrap::{Gain, bootstrap};
 use numerics::linear::Square;
 use numerics::parallel;
@@ -121,7 +121,7 @@ pub(crate) fn evaluate(
     noise: &Noise,
 ) -> HoldoutFit {
     let mut evaluated = evaluate_once(candidate, nominal, track, noise);
-    if candidate.model.effects.iter().any(joint::is_joint) {
+    if candidate.model.effects.iter().any(two_mass::is_joint) {
         // The law of a joint takes up the force that is there all the time, which evaluating it
         // finds.
         let mut own = track.clone();
@@ -328,7 +328,7 @@ mod tests {
         let noise = Noise { sensor: 1.0, white: 1e-3, slow: 100.0, tau: 0.01, rest: 1.0, blur: 0.0 };
         let model = Model::default();
         let fit = Fit::new(&model, &nominal, std::slice::from_ref(&track), &noise);
-        let fitted = FittedModel { model, noise, fit, merit: 0.0 };
+        let fitted = FittedModel { model, noise, fit, log_score: 0.0 };
         let evaluated = evaluate(&fitted, &nominal, &track, &noise);
         let of_fold = |fold: usize| {
             (0..track.segment_count()).find(|s| fold_of(0, *s) == fold).expect("it is long enough")

@@ -13,7 +13,7 @@ const SAME_MOTION: f64 = 0.97;
 /// The smallest correlation of residuals that repeat, and the standard errors by which it must
 /// exceed chance.
 const REPEATS: f64 = 0.5;
-const SURELY: f64 = 4.0;
+const REPEATS_Z: f64 = 4.0;
 /// Shortest stretch that is compared, s, and shift within which recordings are aligned, s.
 const SHORTEST_S: f64 = 1.0;
 const SHIFT_S: f64 = 1.0;
@@ -96,7 +96,7 @@ pub(crate) fn correlation_of_repeats(
     }
     let correlation = sum / f64::max(samples, 1.0);
     let independent = samples * (independent_hz / RATE_HZ).min(1.0);
-    (correlation > REPEATS && correlation * independent.sqrt() > SURELY).then_some(correlation)
+    (correlation > REPEATS && correlation * independent.sqrt() > REPEATS_Z).then_some(correlation)
 }
 
 /// True if the motion differs within a period: a slow one is like itself a moment later too.

@@ -12,17 +12,14 @@ use std::f64::consts::TAU;
 const OVERSAMPLED: f64 = 2.6;
 /// Fewest cycles over the longest recording: less is a drift.
 const FEWEST_CYCLES: f64 = 12.0;
-/// Most of the motion, as parts of its mean square, that may be at the frequency of a swing that
-/// does not follow it, for a light axis gives way to it, and that may be about as fast otherwise:
-/// what repeats with the motion swings too, at its frequency and multiples of it. The smaller the
-/// part of the residual without the swing, the larger both are, up to `ROOM` times, because a force
-/// that repeats with the motion leaves a large residual.
+/// At most 6 % of the motion's power may be at the tone and 2 % near it, both scaled up to 4× where
+/// the tone is most of the residual. A light axis gives way to a tone; a force that repeats with
+/// the motion swings at its frequency too, and leaves a large residual.
 const GIVES_WAY: f64 = 0.06;
 const FAST_MOTION: f64 = 0.02;
 const ROOM: f64 = 4.0;
-/// Most that the drive may do at that frequency, over the swing's mean square: a loop answers what
-/// comes from outside with half as much again at most, and what a lag or a short delay leaves is
-/// less than the drive makes.
+/// Most power of the drive at that frequency, over the tone's. A loop answers an outside force with
+/// 1.5 times its amplitude at most; a lag or a short delay leaves less than the drive makes.
 const DRIVEN: f64 = 2.25;
 
 /// A force at one frequency on the held-out recordings.
@@ -34,7 +31,7 @@ pub(crate) struct TonalDisturbance {
 }
 
 /// The drive's force, and the residual of the refitted model.
-pub(crate) struct Left<'a> {
+pub(crate) struct ResidualView<'a> {
     pub(crate) tracks: &'a [BlockedRecording],
     pub(crate) force: &'a [Vec<f64>],
     pub(crate) refit: &'a [Vec<f64>],
@@ -116,7 +113,7 @@ fn is_apart(motion: &[Samples], hertz: f64, part: f64) -> bool {
 
 /// The frequency at which a swing would explain the most of what the refit leaves on the fitted
 /// recordings.
-pub(crate) fn frequency(estimator: &Estimator, fit: &Left) -> Option<f64> {
+pub(crate) fn frequency(estimator: &Estimator, fit: &ResidualView) -> Option<f64> {
     let left = samples(estimator, fit.tracks, fit.refit);
     let apart = apart(&left);
     let first = 2.0 * FEWEST_CYCLES * apart;
@@ -140,7 +137,7 @@ fn nearby(hertz: f64, apart: f64, all: &[Samples]) -> f64 {
 
 /// The swing at about `hertz` as held-out recordings show it; none where the axis itself moves or
 /// is driven so.
-pub(crate) fn swing(estimator: &Estimator, hertz: f64, holdout: &Left) -> Option<TonalDisturbance> {
+pub(crate) fn swing(estimator: &Estimator, hertz: f64, holdout: &ResidualView) -> Option<TonalDisturbance> {
     let of_held = |signals: &[Vec<f64>]| samples(estimator, holdout.tracks, signals);
     let before = of_held(holdout.refit);
     // Each recorder has a clock of its own.

@@ -38,7 +38,7 @@ pub(crate) enum Key {
 
 /// An inertia that fits whose values are shown keep.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Kept {
+pub(crate) enum InertiaSource {
     /// Gain over inertia, seen in the band that the counts support.
     Seen(f64),
     /// The rig's: the recordings show none.
@@ -56,7 +56,7 @@ pub(crate) struct Nominal {
     pub(crate) anchor: Option<(f64, f64)>,
     /// The inertia of fits whose values are shown, where the rig hardly knows it and noise hides it
     /// from the fits of the search.
-    pub(crate) kept_inertia: Option<Kept>,
+    pub(crate) kept_inertia: Option<InertiaSource>,
     /// True if the refit explains most of the force.
     pub(crate) is_balanced: bool,
     /// Inertia added to rig and command alike, where the machine's own hardly matters, kg·m² or kg.
@@ -117,8 +117,8 @@ impl Nominal {
     /// under a speed loop makes it as heavy as it may be.
     pub(crate) fn shown(&self) -> Self {
         let anchor = match self.kept_inertia {
-            Some(Kept::Seen(gain)) => Some((gain, KEPT)),
-            Some(Kept::OfRig) => Some((self.gain(), KEPT)),
+            Some(InertiaSource::Seen(gain)) => Some((gain, KEPT)),
+            Some(InertiaSource::OfRig) => Some((self.gain(), KEPT)),
             None => self.anchor,
         };
         Self { anchor, ..self.clone() }

@@ -38,9 +38,9 @@ shape! {
     }
 }
 
-pub(super) struct Defined;
+pub(super) struct AsymmetricFriction;
 
-impl EffectLaw for Defined {
+impl EffectLaw for AsymmetricFriction {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         Some(Box::new(AsymmetricFrictionLaw { viscous_only: Shape::of(effect).viscous_only }))
     }
@@ -72,7 +72,7 @@ impl EffectLaw for Defined {
     }
 }
 
-impl EffectSearch for Defined {
+impl EffectSearch for AsymmetricFriction {
     fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
         // Any friction is one that differs with direction where there is one direction.
         if span.one_way {
@@ -89,7 +89,7 @@ impl EffectSearch for Defined {
     }
 }
 
-impl EffectReport for Defined {
+impl EffectReport for AsymmetricFriction {
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         let mut out = Vec::new();
         let mut put = |name: &str, term: (f64, f64), friction: f64| {

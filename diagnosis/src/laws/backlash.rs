@@ -42,9 +42,9 @@ shape! {
     }
 }
 
-pub(super) struct Defined;
+pub(super) struct Backlash;
 
-impl EffectLaw for Defined {
+impl EffectLaw for Backlash {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         let Shape { gap, contact_hz } = Shape::of(effect);
         Some(Box::new(BacklashLaw(Load::behind_gap(effect, gap, contact_hz))))
@@ -62,7 +62,7 @@ impl EffectLaw for Defined {
     }
 }
 
-impl EffectSearch for Defined {
+impl EffectSearch for Backlash {
     fn is_unseen(&self, effect: &Effect, count: f64) -> bool {
         Shape::of(effect).gap < SEEN * count
     }
@@ -96,7 +96,7 @@ impl EffectSearch for Defined {
     }
 }
 
-impl EffectReport for Defined {
+impl EffectReport for Backlash {
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         vec![Reported::new("gap", fitted.shape("gap"), fitted.length)]
     }

@@ -22,9 +22,9 @@ impl ForceLaw for CoulombFrictionLaw {
     }
 }
 
-pub(super) struct Defined;
+pub(super) struct CoulombFriction;
 
-impl EffectLaw for Defined {
+impl EffectLaw for CoulombFriction {
     fn law(&self, _effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         Some(Box::new(CoulombFrictionLaw))
     }
@@ -43,7 +43,7 @@ impl EffectLaw for Defined {
     }
 }
 
-impl EffectSearch for Defined {
+impl EffectSearch for CoulombFriction {
     fn grid(&self, name: EffectName, _span: &Span) -> Vec<Effect> {
         vec![Effect::shaped(name, &[])]
     }
@@ -52,7 +52,7 @@ impl EffectSearch for Defined {
     }
 }
 
-impl EffectReport for Defined {
+impl EffectReport for CoulombFriction {
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         fitted.one_force("coulomb", fitted.force.into())
     }

@@ -73,9 +73,9 @@ shape! {
     }
 }
 
-pub(super) struct Defined;
+pub(super) struct DriveCompliance;
 
-impl EffectLaw for Defined {
+impl EffectLaw for DriveCompliance {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         let Shape { resonance_hz, damping } = Shape::of(effect);
         Some(Box::new(DriveComplianceLaw { omega: TAU * resonance_hz, damping, state: None }))
@@ -91,7 +91,7 @@ impl EffectLaw for Defined {
     }
 }
 
-impl EffectSearch for Defined {
+impl EffectSearch for DriveCompliance {
     fn has_optima_apart(&self) -> bool {
         true
     }
@@ -109,7 +109,7 @@ impl EffectSearch for Defined {
     }
 }
 
-impl EffectReport for Defined {
+impl EffectReport for DriveCompliance {
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         let (f, s) = fitted.shape("resonance_hz");
         let (x, sd) = fitted.term(0);

@@ -20,9 +20,9 @@ impl ForceLaw for DriveLossLaw {
     }
 }
 
-pub(super) struct Defined;
+pub(super) struct DriveLoss;
 
-impl EffectLaw for Defined {
+impl EffectLaw for DriveLoss {
     fn law(&self, _effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         Some(Box::new(DriveLossLaw))
     }
@@ -37,13 +37,13 @@ impl EffectLaw for Defined {
     }
 }
 
-impl EffectSearch for Defined {
+impl EffectSearch for DriveLoss {
     fn grid(&self, name: EffectName, _span: &Span) -> Vec<Effect> {
         vec![Effect::shaped(name, &[])]
     }
 }
 
-impl EffectReport for Defined {
+impl EffectReport for DriveLoss {
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         let (loss, sd) = fitted.term(0);
         let ratio = fitted.ratio.abs();

@@ -38,9 +38,9 @@ impl ForceLaw for FrictionDriftLaw {
     }
 }
 
-pub(super) struct Defined;
+pub(super) struct FrictionDrift;
 
-impl EffectLaw for Defined {
+impl EffectLaw for FrictionDrift {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         Some(Box::new(FrictionDriftLaw(Shape::of(effect))))
     }
@@ -55,7 +55,7 @@ impl EffectLaw for Defined {
     }
 }
 
-impl EffectSearch for Defined {
+impl EffectSearch for FrictionDrift {
     fn has_optima_apart(&self) -> bool {
         true
     }
@@ -77,7 +77,7 @@ impl EffectSearch for Defined {
     }
 }
 
-impl EffectReport for Defined {
+impl EffectReport for FrictionDrift {
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         let (change, sd) = fitted.term(0);
         let base = if fitted.own_dry == 0.0 { fitted.dry.unwrap_or(0.0) } else { fitted.own_dry }.abs();

@@ -64,9 +64,9 @@ impl ForceLaw for GainDriftLaw {
 /// Times, as parts of the longest recording, at which a load may change at once.
 const CHANGES: usize = 40;
 
-pub(super) struct Defined;
+pub(super) struct GainDrift;
 
-impl EffectLaw for Defined {
+impl EffectLaw for GainDrift {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         Some(Box::new(GainDriftLaw { shape: Shape::of(effect), heat: 0.0 }))
     }
@@ -84,7 +84,7 @@ impl EffectLaw for Defined {
     }
 }
 
-impl EffectSearch for Defined {
+impl EffectSearch for GainDrift {
     fn has_optima_apart(&self) -> bool {
         true
     }
@@ -117,7 +117,7 @@ impl EffectSearch for Defined {
     }
 }
 
-impl EffectReport for Defined {
+impl EffectReport for GainDrift {
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         let (change, sd) = fitted.term(0);
         vec![

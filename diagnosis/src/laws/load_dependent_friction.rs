@@ -21,9 +21,9 @@ impl ForceLaw for LoadDependentFrictionLaw {
     }
 }
 
-pub(super) struct Defined;
+pub(super) struct LoadDependentFriction;
 
-impl EffectLaw for Defined {
+impl EffectLaw for LoadDependentFriction {
     fn law(&self, _effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         Some(Box::new(LoadDependentFrictionLaw))
     }
@@ -32,13 +32,13 @@ impl EffectLaw for Defined {
     }
 }
 
-impl EffectSearch for Defined {
+impl EffectSearch for LoadDependentFriction {
     fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
         if span.force { vec![Effect::shaped(name, &[])] } else { Vec::new() }
     }
 }
 
-impl EffectReport for Defined {
+impl EffectReport for LoadDependentFriction {
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         fitted.one_force("coefficient", "1".into())
     }

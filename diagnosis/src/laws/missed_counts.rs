@@ -25,9 +25,9 @@ impl ForceLaw for MissedCountsLaw {
     }
 }
 
-pub(super) struct Defined;
+pub(super) struct MissedCounts;
 
-impl EffectLaw for Defined {
+impl EffectLaw for MissedCounts {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         let steps = effect.shape.iter().filter_map(|(key, time)| Some((key.strip_prefix("time_")?, *time)));
         let (names, times) = steps.map(|(n, time)| (format!("step_{n}"), time)).unzip();
@@ -51,13 +51,13 @@ impl EffectLaw for Defined {
     }
 }
 
-impl EffectSearch for Defined {
+impl EffectSearch for MissedCounts {
     fn grid(&self, name: EffectName, _span: &Span) -> Vec<Effect> {
         vec![Effect::shaped(name, &[])]
     }
 }
 
-impl EffectReport for Defined {
+impl EffectReport for MissedCounts {
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         // All the counts that were lost in the fitted recordings, whichever way.
         let sum = fitted.lost * fitted.term(0).0;

@@ -40,9 +40,9 @@ impl ForceLaw for PreslidingFrictionLaw {
     }
 }
 
-pub(super) struct Defined;
+pub(super) struct PreslidingFriction;
 
-impl EffectLaw for Defined {
+impl EffectLaw for PreslidingFriction {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         Some(Box::new(PreslidingFrictionLaw {
             bristles: Bristles::new(effect),
@@ -65,7 +65,7 @@ impl EffectLaw for Defined {
     }
 }
 
-impl EffectSearch for Defined {
+impl EffectSearch for PreslidingFriction {
     fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
         let at = |spread: f64| {
             logarithmic(2.0 * span.count, 0.03 * span.travel(), 9).into_iter().map(move |deflection| {
@@ -89,7 +89,7 @@ impl EffectSearch for Defined {
     }
 }
 
-impl EffectReport for Defined {
+impl EffectReport for PreslidingFriction {
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         let (c, cs) = fitted.scaled(fitted.term(0));
         let (d, ds) = fitted.shape("deflection");

@@ -1,6 +1,6 @@
 //! The record of a law, which the filter, the regression and the simulator share.
 
-use crate::laws::definition::Shown;
+use crate::laws::definition::ExcitationLimits;
 use crate::laws::{Effect, EffectName};
 use regression::laws::{Bounds, Need, RECORDS, Record, Subsystem};
 
@@ -34,7 +34,7 @@ impl EffectName {
 impl Effect {
     /// Other effects that recordings which show so much cannot distinguish from it, however well
     /// either fits.
-    pub(crate) fn twins(&self, shown: &Shown) -> Vec<EffectName> {
+    pub(crate) fn twins(&self, shown: &ExcitationLimits) -> Vec<EffectName> {
         let twins = self.name.record().map_or(&[][..], |record| record.twins);
         let within = twins.iter().filter(|(limit, _)| shown.is_within(*limit, self));
         within.filter_map(|(_, key)| EffectName::find(key)).collect()

@@ -36,9 +36,9 @@ shape! {
     }
 }
 
-pub(super) struct Defined;
+pub(super) struct RollerSlip;
 
-impl EffectLaw for Defined {
+impl EffectLaw for RollerSlip {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         let Shape { limit, creep } = Shape::of(effect);
         Some(Box::new(RollerSlipLaw(Load::in_grip(effect, limit, creep))))
@@ -51,7 +51,7 @@ impl EffectLaw for Defined {
     }
 }
 
-impl EffectSearch for Defined {
+impl EffectSearch for RollerSlip {
     fn has_optima_apart(&self) -> bool {
         true
     }
@@ -93,7 +93,7 @@ impl EffectSearch for Defined {
     }
 }
 
-impl EffectReport for Defined {
+impl EffectReport for RollerSlip {
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         // The load's part of what the drive would need to press as hard.
         let (limit, s) = fitted.shape("limit");

@@ -39,9 +39,9 @@ shape! {
     }
 }
 
-pub(super) struct Defined;
+pub(super) struct StribeckFriction;
 
-impl EffectLaw for Defined {
+impl EffectLaw for StribeckFriction {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         let Shape { speed, exponent } = Shape::of(effect);
         Some(Box::new(StribeckFrictionLaw { speed, exponent }))
@@ -62,7 +62,7 @@ impl EffectLaw for Defined {
     }
 }
 
-impl EffectSearch for Defined {
+impl EffectSearch for StribeckFriction {
     fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
         let from = (2.0 * span.speed_floor).max(0.004 * span.speed);
         let at = |exponent: f64| {
@@ -77,7 +77,7 @@ impl EffectSearch for Defined {
     }
 }
 
-impl EffectReport for Defined {
+impl EffectReport for StribeckFriction {
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         vec![
             Reported::new("peak", fitted.scaled(fitted.term(0)), fitted.force),

@@ -19,7 +19,7 @@ pub struct ForceTable {
 }
 
 /// Most places of a table.
-const MOST: usize = 100_000;
+const MOST_PLACES: usize = 100_000;
 
 impl ForceTable {
     /// Checks that the table can be run; the reason where not.
@@ -40,9 +40,9 @@ impl ForceTable {
             }
         }
         let wanted: usize = self.grid.iter().map(Vec::len).product();
-        if wanted > MOST || self.force.len() != wanted {
+        if wanted > MOST_PLACES || self.force.len() != wanted {
             return Err(format!(
-                "table.force must hold {wanted} values, one for every place, and at most {MOST}"
+                "table.force must hold {wanted} values, one for every place, and at most {MOST_PLACES}"
             ));
         }
         if self.grid.iter().flatten().chain(&self.force).any(|x| !x.is_finite() || x.abs() > 1e30) {
@@ -126,9 +126,9 @@ impl ForceLaw for TableLaw {
     }
 }
 
-pub(super) struct Defined;
+pub(super) struct Table;
 
-impl EffectLaw for Defined {
+impl EffectLaw for Table {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         let table = effect.table.clone()?;
         Some(Box::new(TableLaw { table, turn: effect.turn().unwrap_or(TAU), way: 0.0, turned: 0.0 }))
@@ -138,7 +138,7 @@ impl EffectLaw for Defined {
     }
 }
 
-impl EffectSearch for Defined {
+impl EffectSearch for Table {
     fn is_sought(&self) -> bool {
         false
     }
@@ -148,7 +148,7 @@ impl EffectSearch for Defined {
     }
 }
 
-impl EffectReport for Defined {
+impl EffectReport for Table {
     /// It is drawn, and has no values of its own.
     fn report(&self, _fitted: &Fitted) -> Vec<Reported> {
         Vec::new()

@@ -6,9 +6,9 @@ use super::shape::ShapeKey;
 use super::waves::{self, Waves};
 use super::{Effect, EffectName};
 
-pub(super) struct Defined;
+pub(super) struct TorqueRipple;
 
-impl EffectLaw for Defined {
+impl EffectLaw for TorqueRipple {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         Some(Box::new(Waves::new(effect, true)))
     }
@@ -23,7 +23,7 @@ impl EffectLaw for Defined {
     }
 }
 
-impl EffectSearch for Defined {
+impl EffectSearch for TorqueRipple {
     fn is_periodic(&self) -> bool {
         true
     }
@@ -35,7 +35,7 @@ impl EffectSearch for Defined {
     }
 }
 
-impl EffectReport for Defined {
+impl EffectReport for TorqueRipple {
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         waves::report(fitted, true)
     }

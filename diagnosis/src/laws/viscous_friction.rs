@@ -22,9 +22,9 @@ impl ForceLaw for ViscousFrictionLaw {
     }
 }
 
-pub(super) struct Defined;
+pub(super) struct ViscousFriction;
 
-impl EffectLaw for Defined {
+impl EffectLaw for ViscousFriction {
     fn law(&self, _effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         Some(Box::new(ViscousFrictionLaw))
     }
@@ -40,7 +40,7 @@ impl EffectLaw for Defined {
     }
 }
 
-impl EffectSearch for Defined {
+impl EffectSearch for ViscousFriction {
     fn grid(&self, name: EffectName, _span: &Span) -> Vec<Effect> {
         vec![Effect::shaped(name, &[])]
     }
@@ -49,7 +49,7 @@ impl EffectSearch for Defined {
     }
 }
 
-impl EffectReport for Defined {
+impl EffectReport for ViscousFriction {
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         fitted.one_force("viscous", format!("{}·s/{}", fitted.force, fitted.length))
     }

@@ -2,7 +2,7 @@
 //! distinguished.
 
 use crate::fit::blocked_recording::BlockedRecording;
-use crate::laws::definition::Shown;
+use crate::laws::definition::ExcitationLimits;
 
 /// Range of the motion of some recordings.
 #[derive(Debug, Clone, Copy)]
@@ -89,12 +89,12 @@ impl Excitation {
     }
 
     /// Returns what decides between twins.
-    pub(crate) fn shown(&self) -> Shown {
-        Shown {
+    pub(crate) fn limits(&self) -> ExcitationLimits {
+        ExcitationLimits {
             one_speed: self.is_one_speed(),
             one_length: self.strokes < ONE_LENGTH,
             less_than_a_turn: self.turns < ONE_TURN,
-            ..Shown::default()
+            ..ExcitationLimits::default()
         }
     }
 }
@@ -114,7 +114,7 @@ mod tests {
             (Excitation { turns: 0.5, ..rich }, N::PositionSpring, N::MassImbalance),
         ];
         for (poor, a, b) in twins {
-            let twins = |name: N, seen: Excitation| Effect::shaped(name, &[]).twins(&seen.shown());
+            let twins = |name: N, seen: Excitation| Effect::shaped(name, &[]).twins(&seen.limits());
             assert_eq!((twins(a, poor), twins(b, poor)), (vec![b], vec![a]));
             assert!(twins(a, rich).is_empty() && twins(b, rich).is_empty());
         }

@@ -20,7 +20,7 @@ use std::f64::consts::TAU;
 
 /// Highest order of a turn that is looked for, and how many orders one effect may have.
 const HIGHEST: usize = 100;
-const MOST: usize = 14;
+const MOST_ORDERS: usize = 14;
 /// Most cycles over the travel that are looked for where no turn is known.
 const MOST_CYCLES: f64 = 480.0;
 /// Fewest half cycles over the travel where no turn is known: less is a shape along the travel.
@@ -153,7 +153,7 @@ impl<'a> Waves<'a> {
             if apart && single[index] > 3.0 {
                 kept.push(index);
             }
-            if kept.len() >= if self.whole { 2 * MOST } else { MOST } {
+            if kept.len() >= if self.whole { 2 * MOST_ORDERS } else { MOST_ORDERS } {
                 break;
             }
         }
@@ -300,7 +300,7 @@ fn forward(
     };
     let mut chosen: Vec<usize> = Vec::new();
     let mut gain = 0.0;
-    while chosen.len() < MOST.min(orders) {
+    while chosen.len() < MOST_ORDERS.min(orders) {
         let trials: Vec<(usize, f64)> = (0..orders)
             .filter(|order| !chosen.contains(order) && may_join(&chosen, *order))
             .map(|order| {

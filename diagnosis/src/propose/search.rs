@@ -1,5 +1,4 @@
-//! Naming: forward selection of effects, backward pruning, and the swap of each effect against its
-//! rivals.
+//! Screens effects, refines their shapes and fits the finalists.
 
 use crate::fit::linear_fit::Fit;
 use crate::fit::model::Model;
@@ -8,10 +7,10 @@ use crate::laws::definition::NominalTerm;
 use crate::laws::{Effect, EffectName as N};
 use crate::propose::candidates;
 use crate::propose::context::{FitContext, FittedModel, cost};
-use crate::propose::joint;
 use crate::propose::periodic::{self, Searched};
 use crate::propose::score_statistic;
 use crate::propose::shape_search::descend;
+use crate::propose::two_mass;
 use numerics::golden_section::golden;
 use numerics::parallel;
 use regression::laws::Need;
@@ -53,7 +52,7 @@ fn along(
 impl FitContext<'_> {
     /// The wanted effects that are not in a model yet and that these recordings may show in
     /// addition to it.
-    pub(crate) fn that_may_be_added(&self, model: &Model, wanted: &dyn Fn(N) -> bool) -> Vec<N> {
+    pub(crate) fn addable_effects(&self, model: &Model, wanted: &dyn Fn(N) -> bool) -> Vec<N> {
         let is_dry = |e: &Effect| e.name.definition().nominal_term() == Some(NominalTerm::Coulomb);
         let dry = self.nominal.has(NominalTerm::Coulomb) || model.effects.iter().any(is_dry);
         self.that_may_show(model, &|name| (dry || !name.needs(Need::DryFriction)) && wanted(name))
@@ -81,7 +80,7 @@ impl FitContext<'_> {
         wanted: &(dyn Fn(N) -> bool + Sync),
     ) -> Vec<(Effect, f64)> {
         let residuals: Vec<Vec<f64>> = (0..self.tracks.len()).map(|r| now.fit.residual(r)).collect();
-        let all = self.that_may_be_added(&now.model, wanted);
+        let all = self.addable_effects(&now.model, wanted);
         let periodic: Vec<N> = all.iter().copied().filter(|name| name.definition().is_periodic()).collect();
         let searched = Searched { fit: &now.fit, residuals: &residuals, model: &now.model };
         let waves = periodic::search(&periodic, self, &searched);
@@ -141,7 +140,7 @@ impl FitContext<'_> {
             model.effects.push(effect.clone());
             self.fit(model, &now.noise, Colour::White)
         });
-        full.sort_by(|a, b| b.merit.total_cmp(&a.merit));
+        full.sort_by(|a, b| b.log_score.total_cmp(&a.log_score));
         full
     }
 
@@ -150,11 +149,11 @@ impl FitContext<'_> {
         let polished =
             parallel::map_all(&candidates[..candidates.len().min(POLISHED)], |c| self.polish_one(c));
         for (old, new) in candidates.iter_mut().zip(polished) {
-            if new.merit > old.merit {
+            if new.log_score > old.log_score {
                 *old = new;
             }
         }
-        candidates.sort_by(|a, b| b.merit.total_cmp(&a.merit));
+        candidates.sort_by(|a, b| b.log_score.total_cmp(&a.log_score));
     }
 
     /// Looks for waves again under the noise that those found first have left: weak ones hide in
@@ -168,7 +167,7 @@ impl FitContext<'_> {
             let searched = Searched { fit: &base, residuals: &residuals, model: &model };
             let (effect, _) = periodic::search(&[name], self, &searched).pop()?;
             model.effects.push(effect);
-            Some(self.fit(model, &from.noise, Colour::White)).filter(|found| found.merit > from.merit)
+            Some(self.fit(model, &from.noise, Colour::White)).filter(|found| found.log_score > from.log_score)
         };
         let mut best = self.fit(candidate.model.clone(), &candidate.noise, Colour::White);
         for _ in 0..SEARCHES {
@@ -185,7 +184,7 @@ impl FitContext<'_> {
             return self.search_waves_again(candidate);
         }
         let mut model = candidate.model.clone();
-        let merit = |model: &Model| self.merit_of(model, &candidate.noise);
+        let log_score = |model: &Model| self.log_score_of(model, &candidate.noise);
         let mut best = candidate.fit.log_likelihood;
         let movable = candidates::movable(&candidate.model.effects[last], self.span);
         // The score test holds the gain and looks near by: delays, drifts and events have optima
@@ -199,7 +198,7 @@ impl FitContext<'_> {
                 for factor in APART {
                     let mut trial = model.clone();
                     trial.effects[last].shape.insert(key.to_owned(), (at * factor).clamp(low, high));
-                    let value = merit(&trial);
+                    let value = log_score(&trial);
                     if value > best {
                         best = value;
                         taken = Some((factor, trial));
@@ -214,7 +213,7 @@ impl FitContext<'_> {
             }
         }
         if let Some((value, found)) =
-            joint::search(self, &model, &candidate.noise, &merit).filter(|f| f.0 > best)
+            two_mass::search(self, &model, &candidate.noise, &log_score).filter(|f| f.0 > best)
         {
             (best, model) = (value, found);
         }
@@ -226,14 +225,14 @@ impl FitContext<'_> {
                 trial.effects[last] = effect.clone();
                 trial
             };
-            let found = along(&model.effects[last], key, ends, 8, &|effect| merit(&with(effect)));
+            let found = along(&model.effects[last], key, ends, 8, &|effect| log_score(&with(effect)));
             if let Some((value, effect)) = found.filter(|(value, _)| *value > best) {
                 best = value;
                 model.effects[last] = effect;
             }
         }
-        let found = descend(self, model, &candidate.noise, best, &merit);
-        let (_, model) = joint::settle(self, found, &candidate.noise, &merit);
+        let found = descend(self, model, &candidate.noise, best, &log_score);
+        let (_, model) = two_mass::settle(self, found, &candidate.noise, &log_score);
         self.fit(model, &candidate.noise, Colour::White)
     }
 }

@@ -4,7 +4,7 @@ use crate::laws::{ForceTable, Variable};
 use numerics::digits::short;
 
 /// Part of a form's mean square that counts as all of it, in words.
-const MOST: f64 = 0.85;
+const NEARLY_ALL: f64 = 0.85;
 /// Part of the mean square that proportion to speed must explain to be reported as such: a square
 /// of the speed has 0.94.
 const PROPORTIONAL: f64 = 0.97;
@@ -52,16 +52,16 @@ pub(super) fn sentence(table: &ForceTable, visits: &[f64], length: &str) -> Stri
     let (forward, backward) = whole.halves();
     let (ahead, back) = (forward.square(), backward.square());
     let share = ahead / (ahead + back).max(1e-300);
-    let (way, end, sheet) = if share > MOST {
+    let (way, end, sheet) = if share > NEARLY_ALL {
         (forward.sense(1.0), ", forward only", forward)
-    } else if share < 1.0 - MOST {
+    } else if share < 1.0 - NEARLY_ALL {
         (backward.sense(-1.0), ", backward only", backward)
     } else {
         let (odd, even) = (forward.with(&backward, -1.0), forward.with(&backward, 1.0));
         let whole = odd.square() + even.square();
-        if odd.square() > MOST * whole {
+        if odd.square() > NEARLY_ALL * whole {
             (odd.sense(1.0), "", odd)
-        } else if even.square() > MOST * whole {
+        } else if even.square() > NEARLY_ALL * whole {
             ("", ", the same in both directions", even)
         } else {
             ("", ", not the same in both directions", forward)
@@ -165,10 +165,10 @@ impl Sheet {
             return along(Variable::Speed, &self.columns, &by_speed, length);
         };
         let by_other = self.by_row();
-        if self.explained(|_, j| by_speed[j].0) > MOST {
+        if self.explained(|_, j| by_speed[j].0) > NEARLY_ALL {
             return along(Variable::Speed, &self.columns, &by_speed, length);
         }
-        if self.explained(|i, _| by_other[i].0) > MOST {
+        if self.explained(|i, _| by_other[i].0) > NEARLY_ALL {
             return along(other, &self.rows, &by_other, length);
         }
         let (a, b) = self.product();

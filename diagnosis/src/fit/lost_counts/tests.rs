@@ -42,7 +42,7 @@ fn turning(mut counts: impl FnMut(f64) -> f64) -> ([BlockedRecording; 1], Nomina
 
 /// Returns the counts found to be lost, and the blocks' starts, s, of an axis whose reading
 /// moves by `counts`.
-fn lost(counts: impl Fn(f64) -> f64, asked: Asked) -> (Vec<f64>, Vec<f64>) {
+fn lost(counts: impl Fn(f64) -> f64, asked: JumpPrior) -> (Vec<f64>, Vec<f64>) {
     let (tracks, nominal, count) = turning(counts);
     let noise = Noise { sensor: 1.0, white: 1e-3, slow: 1e-9, tau: 0.1, rest: 1.0, blur: 0.0 };
     let fit = Fit::new(&Model::default(), &nominal, &tracks, &noise);
@@ -54,7 +54,7 @@ fn lost(counts: impl Fn(f64) -> f64, asked: Asked) -> (Vec<f64>, Vec<f64>) {
 fn lost_counts_are_found_with_their_moment_and_number() {
     let after = |at: f64, t: f64| f64::from(u8::from(t >= at));
     let reads = |t: f64| 3000.3 * t - 2.0 * after(0.6003, t) - after(1.2349, t);
-    let (lost, start) = lost(reads, Asked::UNKNOWN);
+    let (lost, start) = lost(reads, JumpPrior::UNKNOWN);
     let at = |t: f64| lost[start.partition_point(|start| *start < t)];
     assert_eq!(at(0.58), 0.0);
     assert!((at(0.62) + 2.0).abs() < 0.1 && (at(1.26) + 3.0).abs() < 0.1, "{} {}", at(0.62), at(1.26));
@@ -64,16 +64,16 @@ fn lost_counts_are_found_with_their_moment_and_number() {
 fn a_single_loss_needs_other_losses_unlike_an_impact() {
     let once = |t: f64| 3000.3 * t - if t < 0.6 { 0.0 } else { 3.0 };
     let any = |lost: (Vec<f64>, Vec<f64>)| lost.0.iter().any(|lost| *lost != 0.0);
-    assert!(!any(lost(once, Asked::UNKNOWN)) && any(lost(once, Asked::KNOWN)));
+    assert!(!any(lost(once, JumpPrior::UNKNOWN)) && any(lost(once, JumpPrior::KNOWN)));
     let impact = |t: f64| 3000.3 * t - 60.0 * (t - 0.6).max(0.0);
-    assert!(!any(lost(impact, Asked::KNOWN)));
+    assert!(!any(lost(impact, JumpPrior::KNOWN)));
 }
 
 /// The price is what keeps a search of the very recording that is judged from gaining by
 /// chance.
 #[test]
 fn jumps_that_chance_makes_cost_more_than_they_gain() {
-    let any = Asked { gain: 2.0, least: 0.0, fewest: 1 };
+    let any = JumpPrior { gain: 2.0, least: 0.0, fewest: 1 };
     let (mut gained, mut paid, mut jumps) = (0.0, 0.0, 0);
     for seed in 1..21 {
         let mut random = Random::new(seed);

@@ -40,12 +40,12 @@ pub(crate) struct Span {
     pub(crate) tilt: bool,
     pub(crate) force: bool,
     /// The rig's statement of the machine.
-    pub(crate) rig: Believed,
+    pub(crate) rig: RigFacts,
 }
 
 /// The rig's statement of the machine.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Believed {
+pub(crate) struct RigFacts {
     /// Travel per turn of the motor and of the axis itself, where they are known, rad or m.
     pub(crate) turn: Option<f64>,
     pub(crate) axis_turn: Option<f64>,
@@ -65,7 +65,7 @@ pub(crate) struct Believed {
     pub(crate) per_command: f64,
 }
 
-impl Shown {
+impl ExcitationLimits {
     /// True if the recordings, and a fitted effect, are within a limit.
     pub(crate) fn is_within(&self, limit: Within, effect: &Effect) -> bool {
         match limit {
@@ -89,7 +89,7 @@ impl Span {
 
 /// Limits of the recordings that decide whether twins can be distinguished.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Shown {
+pub(crate) struct ExcitationLimits {
     /// True if all motion is at one speed, one way, in strokes of one length, within less than a
     /// turn, and along a line.
     pub(crate) one_speed: bool,
