@@ -123,11 +123,11 @@ mod tests {
 
     #[test]
     fn more_left_over_is_less_sure_and_more_explained_is_surer() {
-        let at = |key: &str, value: f64| confidence(&evidence(&[(key, value)]));
-        assert!(at("unexplained_of_force", 2.0) < at("unexplained_of_force", 0.1));
-        assert!(at("share", -0.1) > at("share", -2.5));
-        assert!(at("least_z", 2.0) > at("least_z", 0.7));
-        assert!(at("unexplained", 0.9) < at("unexplained", 0.1));
+        let confidence_at = |key: &str, value: f64| confidence(&evidence(&[(key, value)]));
+        assert!(confidence_at("unexplained_of_force", 2.0) < confidence_at("unexplained_of_force", 0.1));
+        assert!(confidence_at("share", -0.1) > confidence_at("share", -2.5));
+        assert!(confidence_at("least_z", 2.0) > confidence_at("least_z", 0.7));
+        assert!(confidence_at("unexplained", 0.9) < confidence_at("unexplained", 0.1));
     }
 
     #[test]

@@ -186,7 +186,7 @@ impl Decision<'_> {
         let Assessment { fit, weighed, .. } = self.assessment;
         let nominal = &self.prepared.nominal;
         let (context, patched) = (self.prepared.context(fit), &with_named.unwrap_or(&weighed.shown).patched);
-        let one = |(i, effect): (usize, &WeighedEffect)| NamedEffect {
+        let named_effect = |(i, effect): (usize, &WeighedEffect)| NamedEffect {
             name: effect.found.effect.name,
             class: effect.class.clone(),
             confidence: match follows_worse {
@@ -207,7 +207,7 @@ impl Decision<'_> {
         };
         let named = weighed.named().into_iter().map(|i| &weighed.effects[i]).enumerate();
         let mut effects: Vec<(f64, NamedEffect)> =
-            named.map(|(i, effect)| (effect.found.holdout.sum, one((i, effect)))).collect();
+            named.map(|(i, effect)| (effect.found.holdout.sum, named_effect((i, effect)))).collect();
         effects.sort_by(|a, b| b.0.total_cmp(&a.0));
         effects.into_iter().map(|(_, named)| named).collect()
     }
@@ -318,9 +318,9 @@ fn all_series(
     of: &Residuals,
     holdout: bool,
 ) -> Vec<Series> {
-    let one = |(r, track): (usize, &BlockedRecording)| {
+    let series = |(r, track): (usize, &BlockedRecording)| {
         let moving = estimator.moving(track);
         Series::new(track, holdout, &moving, &of.nominal[r], &of.refit[r], &of.patched[r], &of.force[r])
     };
-    tracks.iter().enumerate().map(one).collect()
+    tracks.iter().enumerate().map(series).collect()
 }

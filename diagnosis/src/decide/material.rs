@@ -128,9 +128,13 @@ mod tests {
 
     #[test]
     fn the_least_share_is_sure_enough_and_a_larger_one_surer() {
-        let at = |share| {
+        let confidence_at = |share| {
             SelectedByShare { name: EffectName::QuadraticDrag, share, class: Vec::new() }.confidence()
         };
-        assert!(at(NAMED_SHARE) >= NAMED && at(0.5) > at(0.3) && at(0.9) < 1.0);
+        assert!(
+            confidence_at(NAMED_SHARE) >= NAMED
+                && confidence_at(0.5) > confidence_at(0.3)
+                && confidence_at(0.9) < 1.0
+        );
     }
 }

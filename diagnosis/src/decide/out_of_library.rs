@@ -17,8 +17,7 @@ use numerics::parallel;
 
 /// Physics without a name that may look like a fitted effect; all there is where nothing is fitted.
 pub(crate) fn unnamed_like(fitted: Option<&Effect>, context: &FitContext) -> Vec<Unnamed> {
-    let of = |name: &EffectName| name.definition().unnamed(*name, fitted, context.span);
-    EffectName::ALL.iter().flat_map(of).collect()
+    EffectName::ALL.iter().flat_map(|name| name.definition().unnamed(*name, fitted, context.span)).collect()
 }
 
 /// Physics without a name that explains most of what a refit leaves.
@@ -59,7 +58,7 @@ pub(crate) fn rather(
     effect: usize,
     gain: f64,
 ) -> Option<BetterExplanation> {
-    let more = |foreign: &Unnamed| {
+    let lead = |foreign: &Unnamed| {
         let mut model = fitted.model.clone();
         model.effects[effect] = foreign.effect.clone();
         let fit = Fit::new(&model, context.nominal, context.tracks, &fitted.noise);
@@ -67,10 +66,10 @@ pub(crate) fn rather(
         fit.log_likelihood - fitted.fit.log_likelihood - least
     };
     let all = unnamed_like(Some(&fitted.model.effects[effect]), context);
-    parallel::map_all(&all, more)
+    parallel::map_all(&all, lead)
         .into_iter()
         .zip(all)
         .max_by(|a, b| a.0.total_cmp(&b.0))
-        .filter(|(more, _)| *more > 0.0)
+        .filter(|(lead, _)| *lead > 0.0)
         .map(|(_, foreign)| BetterExplanation::Unnamed { what: foreign.what })
 }

@@ -204,13 +204,13 @@ mod tests {
     #[test]
     fn an_unseen_gap_may_be_a_spring() {
         use EffectName as N;
-        let of = |name: N, shape: &[(&str, f64)], linear: bool| {
+        let twins = |name: N, shape: &[(&str, f64)], linear: bool| {
             let shown = ExcitationLimits { linear, count: 1e-6, ..ExcitationLimits::default() };
             Effect::shaped(name, shape).twins(&shown)
         };
-        assert_eq!(of(N::Backlash, &[("gap", 1.5e-6)], true), [N::DriveCompliance]);
-        assert!(of(N::Backlash, &[("gap", 3e-6)], true).is_empty());
-        assert_eq!(of(N::MassImbalance, &[], true), [N::Cogging]);
-        assert!(of(N::MassImbalance, &[], false).is_empty(), "there a mass turns");
+        assert_eq!(twins(N::Backlash, &[("gap", 1.5e-6)], true), [N::DriveCompliance]);
+        assert!(twins(N::Backlash, &[("gap", 3e-6)], true).is_empty());
+        assert_eq!(twins(N::MassImbalance, &[], true), [N::Cogging]);
+        assert!(twins(N::MassImbalance, &[], false).is_empty(), "there a mass turns");
     }
 }

@@ -101,19 +101,23 @@ fn seen(recording: &Recording, rig: &Rig) -> Seen {
     }
 }
 
-/// Pairs of values of the rig whose errors go together in a fit.
-fn alike(fit: &Fit) -> Vec<(&'static str, &'static str, f64)> {
-    let word = |key: Key| match key {
+/// A value of the rig in words; none for what is no value of it.
+fn in_words(key: Key) -> Option<&'static str> {
+    match key {
         Key::Gain => Some("inertia over gain"),
         Key::Viscous => Some("viscous friction"),
         Key::Coulomb => Some("dry friction"),
         Key::Weight => Some("the weight under the tilt"),
         Key::Gravity => Some("gravity"),
         _ => None,
-    };
+    }
+}
+
+/// Pairs of values of the rig whose errors go together in a fit.
+fn alike(fit: &Fit) -> Vec<(&'static str, &'static str, f64)> {
     let covariance = &fit.solution.covariance;
     let values: Vec<(usize, &'static str)> =
-        fit.keys.iter().enumerate().filter_map(|(i, (key, _))| Some((i, word(*key)?))).collect();
+        fit.keys.iter().enumerate().filter_map(|(i, (key, _))| Some((i, in_words(*key)?))).collect();
     let correlation = |i: usize, j: usize| {
         covariance.at(i, j) / (covariance.at(i, i) * covariance.at(j, j)).sqrt().max(1e-300)
     };

@@ -54,8 +54,8 @@ pub(crate) fn beyond(tracks: &[BlockedRecording], model: &Model, span: &Span) ->
     if !known.iter().any(is_known) {
         return None;
     }
-    let all = || known.iter().flat_map(BlockedRecording::places);
-    let (from, to) = (all().fold(span.low, f64::min), all().fold(span.high, f64::max));
+    let places = || known.iter().flat_map(BlockedRecording::places);
+    let (from, to) = (places().fold(span.low, f64::min), places().fold(span.high, f64::max));
     Some(BeyondFitted { from, to, low: span.low, high: span.high })
 }
 

@@ -72,15 +72,15 @@ pub(crate) fn correlation_of_repeats(
     };
     for (i, a) in all.iter().enumerate() {
         for b in &all[i + 1..] {
-            let at = |lag: usize, first: &Sampled, second: &Sampled| {
+            let correlations = |lag: usize, first: &Sampled, second: &Sampled| {
                 let from = lag.min(first.motion.len());
-                let of =
+                let rows_from =
                     |one: &Sampled, from: usize| (one.motion[from..].to_vec(), one.left[from..].to_vec());
-                let (a, b) = (of(first, from), of(second, 0));
+                let (a, b) = (rows_from(first, from), rows_from(second, 0));
                 let n = a.0.len().min(b.0.len());
                 (correlation(&a.0[..n], &b.0[..n]), compared((&a.0, &a.1), (&b.0, &b.1)))
             };
-            let lags = (0..=shift).flat_map(|lag| [at(lag, a, b), at(lag, b, a)]);
+            let lags = (0..=shift).flat_map(|lag| [correlations(lag, a, b), correlations(lag, b, a)]);
             add(lags.max_by(|x, y| x.0.total_cmp(&y.0)).and_then(|(_, found)| found));
         }
         // The shortest period after which the motion is the same again.

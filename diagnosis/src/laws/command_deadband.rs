@@ -35,12 +35,12 @@ impl EffectSearch for CommandDeadband {
         true
     }
     fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
-        let at = |shift: f64| {
+        let bands = |shift: f64| {
             logarithmic(0.01 * span.command, 0.85 * span.dead, 11)
                 .into_iter()
                 .map(move |width| Effect::shaped(name, &[("half_width", width), ("shift", shift)]))
         };
-        at(0.0).chain(at(1.0)).collect()
+        bands(0.0).chain(bands(1.0)).collect()
     }
     fn movable(&self, _effect: &Effect, span: &Span) -> Vec<Movable> {
         vec![("half_width", 0.001 * span.command, span.dead)]

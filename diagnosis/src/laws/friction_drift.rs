@@ -60,14 +60,14 @@ impl EffectSearch for FrictionDrift {
         true
     }
     fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
-        let at = |time_constant: f64| {
+        let settling_in = |time_constant: f64| {
             let mut drift = Effect::shaped(name, &[("time_constant", time_constant)]);
             if !span.rig.has_viscous {
                 drift.shape.insert("dry_only".into(), 1.0);
             }
             drift
         };
-        logarithmic(0.08 * span.duration, 2.0 * span.duration, 5).into_iter().map(at).collect()
+        logarithmic(0.08 * span.duration, 2.0 * span.duration, 5).into_iter().map(settling_in).collect()
     }
     fn movable(&self, _effect: &Effect, span: &Span) -> Vec<Movable> {
         vec![("time_constant", 0.02 * span.duration, 5.0 * span.duration)]

@@ -108,12 +108,12 @@ impl EffectSearch for GainDrift {
         if fitted.is_some_and(|effect| effect.name != name) {
             return Vec::new();
         }
-        let at = |i: usize| {
+        let sudden_load = |i: usize| {
             let time = span.duration * i as f64 / CHANGES as f64;
             let effect = Effect::shaped(name, &[("time_constant", span.duration), ("at_once_s", time)]);
             Unnamed { effect, freedom: 4.0, what: format!("a load that changes at once, at {time:.1} s,") }
         };
-        (1..CHANGES).map(at).collect()
+        (1..CHANGES).map(sudden_load).collect()
     }
 }
 

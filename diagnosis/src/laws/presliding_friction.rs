@@ -67,12 +67,12 @@ impl EffectLaw for PreslidingFriction {
 
 impl EffectSearch for PreslidingFriction {
     fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
-        let at = |spread: f64| {
+        let bristles = |spread: f64| {
             logarithmic(2.0 * span.count, 0.03 * span.travel(), 9).into_iter().map(move |deflection| {
                 Effect::shaped(name, &[("deflection", deflection), ("spread", spread)])
             })
         };
-        at(1.0).chain(at(SPREAD)).collect()
+        bristles(1.0).chain(bristles(SPREAD)).collect()
     }
     fn movable(&self, _effect: &Effect, span: &Span) -> Vec<Movable> {
         vec![("deflection", 0.5 * span.count, 0.1 * span.travel())]

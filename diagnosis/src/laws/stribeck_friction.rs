@@ -65,12 +65,12 @@ impl EffectLaw for StribeckFriction {
 impl EffectSearch for StribeckFriction {
     fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
         let from = (2.0 * span.speed_floor).max(0.004 * span.speed);
-        let at = |exponent: f64| {
+        let falls = |exponent: f64| {
             logarithmic(from, 0.4 * span.speed, 8)
                 .into_iter()
                 .map(move |speed| Effect::shaped(name, &[("speed", speed), ("exponent", exponent)]))
         };
-        at(1.0).chain(at(2.0)).collect()
+        falls(1.0).chain(falls(2.0)).collect()
     }
     fn movable(&self, _effect: &Effect, span: &Span) -> Vec<Movable> {
         vec![("speed", 0.002 * span.speed, span.speed), ("exponent", 0.7, 2.3)]

@@ -34,14 +34,14 @@ impl EffectLaw for SupplyLimit {
 
 impl EffectSearch for SupplyLimit {
     fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
-        let at = |limit: f64, speed: f64| {
+        let line = |limit: f64, speed: f64| {
             let shape = [("limit", limit * span.command), ("no_load_speed", speed * span.speed)];
             Effect::shaped(name, &shape)
         };
         // A line above the largest command at the fast speed takes nothing.
         let binds = |limit: f64, speed: f64| limit * (1.0 - 1.0 / speed) < 1.0;
         let all = LIMITS.iter().flat_map(|limit| SPEEDS.iter().map(move |speed| (*limit, *speed)));
-        all.filter(|(limit, speed)| binds(*limit, *speed)).map(|(limit, speed)| at(limit, speed)).collect()
+        all.filter(|(limit, speed)| binds(*limit, *speed)).map(|(limit, speed)| line(limit, speed)).collect()
     }
     fn movable(&self, _effect: &Effect, span: &Span) -> Vec<Movable> {
         let (command, speed) = (span.command, span.speed);

@@ -88,7 +88,7 @@ impl TableLaw {
     /// Values of the variables; `velocity` in place of the state's, whose sign may be asked for at
     /// rest.
     fn values(&self, s: &State, velocity: f64) -> [f64; 2] {
-        let of = |variable: &Variable| match variable {
+        let value_of = |variable: &Variable| match variable {
             Variable::Speed => velocity,
             Variable::Travel => s.position,
             Variable::Angle => s.position.rem_euclid(self.turn),
@@ -97,7 +97,7 @@ impl TableLaw {
             Variable::Time => s.time,
         };
         let mut values = [0.0; 2];
-        self.table.over.iter().zip(&mut values).for_each(|(variable, value)| *value = of(variable));
+        self.table.over.iter().zip(&mut values).for_each(|(variable, value)| *value = value_of(variable));
         values
     }
 }
@@ -189,15 +189,15 @@ mod tests {
     #[test]
     fn what_is_no_table_is_refused_with_the_reason() {
         let right = ForceTable { over: vec![Variable::Time], grid: vec![vec![0.0, 1.0]], force: vec![1.0, 2.0] };
-        let with = |change: fn(&mut ForceTable)| {
+        let refusal = |change: fn(&mut ForceTable)| {
             let mut table = right.clone();
             change(&mut table);
             table.check().unwrap_err()
         };
-        assert!(with(|t| t.over.clear()).contains("one or two"));
-        assert!(with(|t| t.over.push(Variable::Time)).contains("twice"));
-        assert!(with(|t| t.grid[0] = vec![1.0, 0.0]).contains("fall"));
-        assert!(with(|t| t.force.push(0.0)).contains("2 values"));
-        assert!(with(|t| t.force[0] = f64::NAN).contains("finite"));
+        assert!(refusal(|t| t.over.clear()).contains("one or two"));
+        assert!(refusal(|t| t.over.push(Variable::Time)).contains("twice"));
+        assert!(refusal(|t| t.grid[0] = vec![1.0, 0.0]).contains("fall"));
+        assert!(refusal(|t| t.force.push(0.0)).contains("2 values"));
+        assert!(refusal(|t| t.force[0] = f64::NAN).contains("finite"));
     }
 }

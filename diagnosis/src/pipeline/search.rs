@@ -269,11 +269,11 @@ fn plain_sets(on: &FitContext) -> Vec<Model> {
     plain.sort_by_key(|(rank, _)| *rank);
     let mut sets: Vec<Vec<Effect>> = vec![Vec::new()];
     for (_, effect) in plain {
-        let with = |set: &Vec<Effect>| {
+        let extended = |set: &Vec<Effect>| {
             let fits = set.len() < PLAIN_TOGETHER && set.iter().all(|other| other.name != effect.name);
             fits.then(|| set.iter().chain([&effect]).cloned().collect::<Vec<_>>())
         };
-        sets.extend(sets.iter().filter_map(with).collect::<Vec<_>>());
+        sets.extend(sets.iter().filter_map(extended).collect::<Vec<_>>());
     }
     sets.into_iter().skip(1).map(|effects| Model { effects, ..Model::default() }).collect()
 }
@@ -308,12 +308,12 @@ fn order_near_ties(context: &FitContext, before: f64, finalists: &mut [FittedMod
         return;
     }
     let estimator = Estimator::new(context.tracks, &finalists[0].noise, context.scale);
-    let left = |c: &FittedModel| {
+    let error_left = |c: &FittedModel| {
         let inertia = parameters::scale(context.nominal, c).0;
         let totals = c.fit.totals(context.tracks);
         estimator.rms(&forces(&estimator, context.tracks, &totals, inertia), context.tracks)
     };
-    finalists[..near].sort_by_cached_key(|c| left(c).to_bits());
+    finalists[..near].sort_by_cached_key(|c| error_left(c).to_bits());
 }
 
 #[cfg(test)]

@@ -29,8 +29,14 @@ const STROKE_COUNTS: f64 = 4.0;
 fn ratio(mut values: Vec<f64>, part: f64) -> f64 {
     values.sort_by(f64::total_cmp);
     let Some(last) = values.len().checked_sub(1) else { return f64::INFINITY };
-    let at = |p: f64| values[(p * last as f64).round() as usize];
-    at(1.0 - part) / at(part).max(1e-300)
+    let quantile = |p: f64| values[(p * last as f64).round() as usize];
+    quantile(1.0 - part) / quantile(part).max(1e-300)
+}
+
+/// Speeds of the blocks of one recording that move.
+fn moving_speeds(track: &BlockedRecording) -> Vec<f64> {
+    let blocks = track.motion.v.iter().zip(&track.motion.rest);
+    blocks.filter(|(_, rest)| !**rest).map(|(v, _)| v.abs()).collect()
 }
 
 /// Lengths of the strokes of one recording.
@@ -60,23 +66,9 @@ impl Excitation {
     /// Measures recordings whose motion is smoothed; `count` is one of the encoder's and `turn` the
     /// motor's, rad or m.
     pub(crate) fn of(tracks: &[BlockedRecording], count: f64, turn: Option<f64>) -> Self {
-        let moving = |track: &BlockedRecording| -> Vec<f64> {
-            track
-                .motion
-                .v
-                .iter()
-                .zip(&track.motion.rest)
-                .filter(|(_, rest)| !**rest)
-                .map(|(v, _)| v.abs())
-                .collect()
-        };
-        let speeds = ratio(tracks.iter().flat_map(moving).collect(), 0.05);
+        let speeds = ratio(tracks.iter().flat_map(moving_speeds).collect(), 0.05);
         let strokes = ratio(tracks.iter().flat_map(|t| strokes(t, STROKE_COUNTS * count)).collect(), 0.1);
-        let travel = |track: &BlockedRecording| {
-            let fold =
-                |start: f64, pick: fn(f64, f64) -> f64| track.motion.x.iter().copied().fold(start, pick);
-            fold(f64::NEG_INFINITY, f64::max) - fold(f64::INFINITY, f64::min)
-        };
+        let travel = |track: &BlockedRecording| numerics::spread::spread(&track.motion.x);
         let turns = turn.map_or(f64::INFINITY, |turn| {
             tracks.iter().map(|track| travel(track) / turn).fold(0.0, f64::max)
         });

@@ -37,14 +37,14 @@ fn along(
     steps: usize,
     value: &dyn Fn(&Effect) -> f64,
 ) -> Option<(f64, Effect)> {
-    let with = |x: f64| {
+    let moved_to = |x: f64| {
         let mut trial = effect.clone();
         trial.shape.insert(key.to_owned(), x.exp());
         trial
     };
     let (a, b) = (low.ln(), high.ln());
     (b > a).then(|| {
-        let found = with(golden(a, b, steps, |x| value(&with(x))));
+        let found = moved_to(golden(a, b, steps, |x| value(&moved_to(x))));
         (value(&found), found)
     })
 }
@@ -84,29 +84,29 @@ impl FitContext<'_> {
         let periodic: Vec<N> = all.iter().copied().filter(|name| name.definition().is_periodic()).collect();
         let searched = Searched { fit: &now.fit, residuals: &residuals, model: &now.model };
         let waves = periodic::search(&periodic, self, &searched);
-        let best_of = |name: &N| -> Option<(Effect, f64)> {
+        let worth_adding = |name: &N| -> Option<(Effect, f64)> {
             let best = match name.definition().is_periodic() {
-                true => waves.iter().find(|(effect, _)| effect.name == *name).cloned(),
-                false => {
-                    let grid = candidates::shapes(*name, self.span, self.nominal);
-                    score_statistic::best_on_grid(
-                        &now.fit,
-                        &residuals,
-                        &now.model,
-                        self.tracks,
-                        &grid,
-                        self.nominal,
-                    )
-                    .map(|(effect, score)| (effect, score.gain))
+                true => {
+                    waves.iter().find(|(effect, _)| effect.name == *name).map(|(effect, _)| effect.clone())
                 }
+                false => self.best_on_grid(now, &residuals, *name),
             };
-            let (effect, gain) = self.refine(now, &residuals, best?.0);
+            let (effect, gain) = self.refine(now, &residuals, best?);
             let worth = gain - cost(&effect, self.tracks.len(), self.span);
             (worth > 0.0).then_some((effect, worth))
         };
-        let mut found: Vec<(Effect, f64)> = parallel::map_all(&all, best_of).into_iter().flatten().collect();
+        let found = parallel::map_all(&all, worth_adding);
+        let mut found: Vec<(Effect, f64)> = found.into_iter().flatten().collect();
         found.sort_by(|a, b| b.1.total_cmp(&a.1));
         found
+    }
+
+    /// The shape of an effect's grid with the largest score gain.
+    fn best_on_grid(&self, now: &FittedModel, residuals: &[Vec<f64>], name: N) -> Option<Effect> {
+        let grid = candidates::shapes(name, self.span, self.nominal);
+        let (fit, model) = (&now.fit, &now.model);
+        score_statistic::best_on_grid(fit, residuals, model, self.tracks, &grid, self.nominal)
+            .map(|(effect, _)| effect)
     }
 
     /// Moves the shape of an effect to its largest score gain, one value after another.
@@ -159,22 +159,25 @@ impl FitContext<'_> {
     /// Looks for waves again under the noise that those found first have left: weak ones hide in
     /// the noise of a null that knows of none.
     fn search_waves_again(&self, candidate: &FittedModel) -> FittedModel {
-        let again = |from: &FittedModel| {
-            let mut model = from.model.clone();
-            let name = model.effects.pop()?.name;
-            let base = Fit::new(&model, self.nominal, self.tracks, &from.noise);
-            let residuals: Vec<Vec<f64>> = (0..self.tracks.len()).map(|r| base.residual(r)).collect();
-            let searched = Searched { fit: &base, residuals: &residuals, model: &model };
-            let (effect, _) = periodic::search(&[name], self, &searched).pop()?;
-            model.effects.push(effect);
-            Some(self.fit(model, &from.noise, Colour::White)).filter(|found| found.log_score > from.log_score)
-        };
         let mut best = self.fit(candidate.model.clone(), &candidate.noise, Colour::White);
         for _ in 0..SEARCHES {
-            let Some(found) = again(&best) else { break };
+            let Some(found) = self.with_better_waves(&best) else { break };
             best = found;
         }
         best
+    }
+
+    /// Fits the model with the waves that a search under its noise finds; none where they are no
+    /// better.
+    fn with_better_waves(&self, from: &FittedModel) -> Option<FittedModel> {
+        let mut model = from.model.clone();
+        let name = model.effects.pop()?.name;
+        let base = Fit::new(&model, self.nominal, self.tracks, &from.noise);
+        let residuals: Vec<Vec<f64>> = (0..self.tracks.len()).map(|r| base.residual(r)).collect();
+        let searched = Searched { fit: &base, residuals: &residuals, model: &model };
+        let (effect, _) = periodic::search(&[name], self, &searched).pop()?;
+        model.effects.push(effect);
+        Some(self.fit(model, &from.noise, Colour::White)).filter(|found| found.log_score > from.log_score)
     }
 
     /// Moves the shape of the last effect to the largest likelihood of the whole fit.
@@ -220,12 +223,12 @@ impl FitContext<'_> {
         for (key, low, high) in movable.iter().copied() {
             let at = model.effects[last].shape[key];
             let ends = ((at / 1.6).max(low), (at * 1.6).min(high));
-            let with = |effect: &Effect| {
+            let with_last = |effect: &Effect| {
                 let mut trial = model.clone();
                 trial.effects[last] = effect.clone();
                 trial
             };
-            let found = along(&model.effects[last], key, ends, 8, &|effect| log_score(&with(effect)));
+            let found = along(&model.effects[last], key, ends, 8, &|effect| log_score(&with_last(effect)));
             if let Some((value, effect)) = found.filter(|(value, _)| *value > best) {
                 best = value;
                 model.effects[last] = effect;

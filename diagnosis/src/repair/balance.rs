@@ -100,16 +100,16 @@ impl<'a> Balance<'a> {
     /// rows to the next.
     pub(super) fn left_between(&self, rows: &[usize]) -> Unbalanced {
         let start = self.recording.time_s[0];
-        let at = |row: &usize| (self.recording.time_s[*row] - start, self.recording.command[*row]);
+        let point = |row: &usize| (self.recording.time_s[*row] - start, self.recording.command[*row]);
         let mut next = 0;
         let line: Vec<f64> = self
             .grid
             .iter()
             .map(|t| {
-                while next + 1 < rows.len() && at(&rows[next]).0 < *t {
+                while next + 1 < rows.len() && point(&rows[next]).0 < *t {
                     next += 1;
                 }
-                let ((t0, u0), (t1, u1)) = (at(&rows[next.saturating_sub(1)]), at(&rows[next]));
+                let ((t0, u0), (t1, u1)) = (point(&rows[next.saturating_sub(1)]), point(&rows[next]));
                 if t1 > t0 { u0 + (u1 - u0) * ((t - t0) / (t1 - t0)).clamp(0.0, 1.0) } else { u1 }
             })
             .collect();

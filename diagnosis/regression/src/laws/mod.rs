@@ -109,8 +109,8 @@ impl Shape {
             n => values[n - 1] / values[n - 2],
         };
         let low = |i: usize| if i > 0 { values[i - 1] } else { values[i] / ratio(i) };
-        let one =
+        let shape =
             |(i, value): (usize, &f64)| Self { form, value: *value, range: Some((low(i), value * ratio(i))) };
-        values.iter().enumerate().map(one).collect()
+        values.iter().enumerate().map(shape).collect()
     }
 }

@@ -133,9 +133,9 @@ fn drift_shapes(_: &Machine) -> Vec<Shape> {
 }
 fn drift(m: &Machine, i: usize, shape: &Shape) -> Vec<Vec<f64>> {
     let s = &m.states[i];
-    let at = |k: usize| s.t[k] / m.scales.seconds;
+    let time = |k: usize| s.t[k] / m.scales.seconds;
     let line = shape.form == "line";
-    vec![s.each(|k| s.direction[k] * if line { at(k) - 0.5 } else { (-at(k) / shape.value).exp() })]
+    vec![s.each(|k| s.direction[k] * if line { time(k) - 0.5 } else { (-time(k) / shape.value).exp() })]
 }
 
 fn load_shapes(m: &Machine) -> Vec<Shape> {

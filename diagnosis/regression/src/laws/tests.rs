@@ -8,18 +8,18 @@ const H: f64 = 1e-3;
 /// States of a motion that is known at every time; nothing is masked.
 fn machine(q: impl Fn(f64) -> f64, asked: impl Fn(f64) -> f64) -> Machine {
     let t: Vec<f64> = (0..4000).map(|i| f64::from(i) * H).collect();
-    let of = |f: &dyn Fn(f64) -> f64| t.iter().map(|t| f(*t)).collect::<Vec<f64>>();
-    let v = of(&|t| (q(t + 1e-5) - q(t - 1e-5)) / 2e-5);
-    let a = of(&|t| (q(t + 1e-4) - 2.0 * q(t) + q(t - 1e-4)) / 1e-8);
+    let over_time = |f: &dyn Fn(f64) -> f64| t.iter().map(|t| f(*t)).collect::<Vec<f64>>();
+    let v = over_time(&|t| (q(t + 1e-5) - q(t - 1e-5)) / 2e-5);
+    let a = over_time(&|t| (q(t + 1e-4) - 2.0 * q(t) + q(t - 1e-4)) / 1e-8);
     let one = vec![1.0; t.len()];
     let states = States {
         h: H,
-        q: of(&q),
+        q: over_time(&q),
         seen_a: a.clone(),
         direction: v.iter().map(|v| v.signum()).collect(),
         moving: one.clone(),
         since: one.clone(),
-        force: of(&asked),
+        force: over_time(&asked),
         tilt: None,
         load: None,
         jumps: vec![0.0; t.len()],
@@ -62,7 +62,7 @@ fn machine(q: impl Fn(f64) -> f64, asked: impl Fn(f64) -> f64) -> Machine {
         driven: true,
         large_asked: 1.0,
     };
-    Machine { rig, states: vec![states], scales, asked: vec![of(&asked)] }
+    Machine { rig, states: vec![states], scales, asked: vec![over_time(&asked)] }
 }
 
 fn column(m: &Machine, name: &str, form: &'static str, value: f64) -> Vec<Vec<f64>> {

@@ -56,14 +56,14 @@ impl EffectSearch for Formula {
                 let part = (i as f64 + 0.5) / count as f64;
                 if *low > 0.0 { low * (high / low).powf(part) } else { low + (high - low) * part }
             };
-            let with = |effect: &Effect, i: usize| {
+            let with_value = |effect: &Effect, i: usize| {
                 let mut effect = effect.clone();
                 effect.shape.insert((*key).to_owned(), value(i));
                 effect
             };
             out = out
                 .iter()
-                .flat_map(|effect| (0..count).map(|i| with(effect, i)).collect::<Vec<_>>())
+                .flat_map(|effect| (0..count).map(|i| with_value(effect, i)).collect::<Vec<_>>())
                 .collect();
         }
         out

@@ -282,13 +282,13 @@ impl Evaluator<'_> {
     pub(crate) fn densities(&self, model: &Model) -> Densities {
         let base = self.base(model);
         let alone = Normal::new(self, &base, None).density(&base.precision);
-        let of = |form: &Form| {
+        let with_form = |form: &Form| {
             let normal = Normal::new(self, &base, Some(form));
             let precision = self.most_likely(form, &base, &normal);
             (form.inputs, normal.density(&precision))
         };
         let forms: Vec<&Form> = self.forms.iter().filter(|form| !form.frequency.is_empty()).collect();
-        let with = parallel::map_all(&forms, |form| of(form));
+        let with = parallel::map_all(&forms, |form| with_form(form));
         Densities { alone, with }
     }
 
