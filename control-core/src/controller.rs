@@ -4,7 +4,7 @@
 mod exchange;
 mod torque;
 mod watches;
-mod whole;
+mod with_segments;
 
 use crate::anatomy::{self, Insertion};
 use crate::compensation::feedforward::Feedforward;
@@ -23,7 +23,7 @@ use crate::units::{Counts, Millimetres, MillimetresPerSecond, MillinewtonMetres,
 use core::borrow::BorrowMut;
 pub use exchange::{AnyOrder, LargeOrder, Order, Sample, TickInput, TickOutput};
 use fixed::types::I16F16;
-pub use whole::Controller;
+pub use with_segments::Controller;
 
 /// The one of eight ticks in which the watch takes the count.
 const LOOK_TURN: u32 = 4;

@@ -22,7 +22,7 @@ pub struct Readings {
 
 /// The request to the amplifier in the last tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Asked {
+pub struct DriveRequest {
     /// True if it is to be on.
     pub powered: bool,
     /// The code, of 12 bits.
@@ -57,7 +57,7 @@ pub struct DriveMonitor {
     line_on: Lasting,
     line_off: Lasting,
     current: Lasting,
-    asked: [Option<Asked>; CURRENT_LOOKS as usize],
+    asked: [Option<DriveRequest>; CURRENT_LOOKS as usize],
     /// The stuck amplifier has been seen: only a restart puts that right.
     is_stuck: bool,
 }
@@ -101,7 +101,7 @@ impl DriveMonitor {
     }
 
     /// One look.
-    pub fn look(&mut self, readings: &Readings, asked: Asked) -> Verdict {
+    pub fn look(&mut self, readings: &Readings, asked: DriveRequest) -> Verdict {
         let line_on = self.line_on.look(!asked.powered && readings.enable_line, LOOKS);
         let line_off = self.line_off.look(asked.powered && !readings.enable_line, LOOKS);
         let is_wrong = self.current_is_wrong(readings.current, asked);
@@ -121,7 +121,7 @@ impl DriveMonitor {
 
     /// True if the current is that of no command of the last looks, between the least and the
     /// largest of which it may be on its way.
-    fn current_is_wrong(&mut self, current: Option<DacCode>, asked: Asked) -> bool {
+    fn current_is_wrong(&mut self, current: Option<DacCode>, asked: DriveRequest) -> bool {
         self.asked.rotate_right(1);
         self.asked[0] = Some(asked);
         let Some(DacCode(current)) = current else { return false };
@@ -138,11 +138,11 @@ mod tests {
     use super::*;
 
     const FINE: Readings = Readings { stop_open: false, ready: true, enable_line: true, current: None };
-    const ON: Asked = Asked { powered: true, code: DacCode(3000) };
-    const OFF: Asked = Asked { powered: false, code: DacCode(ZERO) };
+    const ON: DriveRequest = DriveRequest { powered: true, code: DacCode(3000) };
+    const OFF: DriveRequest = DriveRequest { powered: false, code: DacCode(ZERO) };
 
     /// The look in which `wanted` first holds of `readings`, after ten of a device that is fine.
-    fn found(readings: Readings, asked: Asked, wanted: impl Fn(&Verdict) -> bool) -> Option<usize> {
+    fn found(readings: Readings, asked: DriveRequest, wanted: impl Fn(&Verdict) -> bool) -> Option<usize> {
         let mut monitor = DriveMonitor::new();
         let fine = Readings { enable_line: asked.powered, ..FINE };
         for _ in 0..10 {
@@ -186,7 +186,7 @@ mod tests {
             let before = code;
             code = if look % 8 < 4 { 2500 } else { 1500 };
             let readings = Readings { current: Some(DacCode(before)), ..FINE };
-            let verdict = monitor.look(&readings, Asked { code: DacCode(code), ..ON });
+            let verdict = monitor.look(&readings, DriveRequest { code: DacCode(code), ..ON });
             assert_eq!(verdict, Verdict::default(), "look {look}");
         }
     }

@@ -1,5 +1,5 @@
-//! Finds a wire that is off: a line that somebody drives stays where it is whichever way it is
-//! pulled, one without a wire goes along. And whether the encoder has power.
+//! Detects a disconnected wire by toggling pull-up and pull-down: a driven line ignores them. Also
+//! tells whether the encoder has power.
 //!
 //! A look takes two settling times, 40 µs, and up to 80 µs where ticks interrupt it. From 25 counts
 //! a millisecond on, a sound line may be low for less than that, two counts of four, and be read as

@@ -17,7 +17,7 @@ const IDENTITY: Identity =
     Identity { serial: [7; 12], firmware: [1, 2, 3], ceilings: Ceilings::new(40, 600), ..Identity::VIRTUAL };
 
 /// A device on a roller of 15 g·cm² with 0.5 mN·m of dry friction.
-struct Bench {
+struct DeviceOnRoller {
     controller: Controller,
     endpoint: Endpoint,
     commands: Commands,
@@ -30,7 +30,7 @@ struct Bench {
     record: Option<Record>,
 }
 
-impl Bench {
+impl DeviceOnRoller {
     fn new(device: &Device, signs: (f64, f64)) -> Self {
         let plan = Plan::new(device, &Patient::nobody()).expect("sound");
         let mut bench = Self {
@@ -117,7 +117,7 @@ fn with(change: impl Fn(&mut Device)) -> Device {
 
 #[test]
 fn only_pulses_that_the_device_has_played_commission_it() {
-    let mut bench = Bench::new(&Device::default(), (1.0, 1.0));
+    let mut bench = DeviceOnRoller::new(&Device::default(), (1.0, 1.0));
     assert_eq!(
         bench.ask(Command::ConfigureDevice(Device::commissioned_virtual())),
         Err(CommandRefusal::NotShown)
@@ -149,7 +149,7 @@ fn only_pulses_that_the_device_has_played_commission_it() {
 #[test]
 fn a_motor_that_drives_the_other_way_is_not_commissioned() {
     for (motor, encoder) in [(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)] {
-        let mut bench = Bench::new(&Device::default(), (motor, encoder));
+        let mut bench = DeviceOnRoller::new(&Device::default(), (motor, encoder));
         bench.pulse(1_300);
         let goes_together = motor * encoder > 0.0;
         let answer = bench.ask(Command::Commission);
@@ -159,7 +159,7 @@ fn a_motor_that_drives_the_other_way_is_not_commissioned() {
 
 #[test]
 fn commands_lower_ceilings_and_only_the_own_record_raises_them() {
-    let mut bench = Bench::new(&Device::commissioned_virtual(), (1.0, 1.0));
+    let mut bench = DeviceOnRoller::new(&Device::commissioned_virtual(), (1.0, 1.0));
     let whole = bench.record();
     let half = with(|device| device.limits.torque.0 /= 2);
     let raised = |field| Err(CommandRefusal::Commissioned(field));
@@ -183,14 +183,14 @@ fn commands_lower_ceilings_and_only_the_own_record_raises_them() {
     assert_eq!(bench.ask(Command::RestoreDevice(edited)), raised(Field::FullScaleTorque));
     assert_eq!(bench.ask(Command::RestoreDevice(whole)), Ok(()));
     // After the flash was lost it is the device's own still.
-    let mut bench = Bench::new(&Device::default(), (1.0, 1.0));
+    let mut bench = DeviceOnRoller::new(&Device::default(), (1.0, 1.0));
     assert_eq!(bench.ask(Command::RestoreDevice(whole)), Ok(()));
     assert_eq!(bench.record(), whole);
 }
 
 #[test]
 fn no_command_passes_the_boards_ceilings() {
-    let mut bench = Bench::new(&Device::default(), (1.0, 1.0));
+    let mut bench = DeviceOnRoller::new(&Device::default(), (1.0, 1.0));
     let strong = Device {
         full_scale_torque: control_core::units::MillinewtonMetres(I16F16::from_num(50)),
         ..with(|device| device.limits.torque.0 = I16F16::from_num(41))
@@ -213,7 +213,7 @@ fn no_command_passes_the_boards_ceilings() {
 /// repeated meanwhile is carried out once.
 #[test]
 fn a_board_answers_for_its_supply_later() {
-    let mut bench = Bench::new(&Device::default(), (1.0, 1.0));
+    let mut bench = DeviceOnRoller::new(&Device::default(), (1.0, 1.0));
     assert_eq!(bench.ask(Command::GuardSupply { set: true }), Ok(()));
     let mut endpoint = bench.endpoint.guarding_supply();
     let mut out = [0; MAX_FRAME];

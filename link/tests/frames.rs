@@ -126,7 +126,7 @@ fn the_largest_frames_fit() {
 }
 
 /// A device with its control law, and the PC's end.
-struct Bench {
+struct LinkedDevice {
     controller: Controller,
     device: Endpoint,
     commands: Commands,
@@ -134,7 +134,7 @@ struct Bench {
     tick: u64,
 }
 
-impl Bench {
+impl LinkedDevice {
     fn new() -> Self {
         let plan = Config::commissioned_virtual().plan().expect("the default is sound");
         Self {
@@ -193,7 +193,7 @@ impl Bench {
 
 #[test]
 fn a_session_begins_with_a_hello_and_loses_nothing() {
-    let mut bench = Bench::new();
+    let mut bench = LinkedDevice::new();
     bench.run(100, |_| 0);
     assert!(bench.drain().is_empty(), "nothing is said before the hello");
     let bytes = bench.bytes(Command::Hello { version: PROTOCOL_VERSION });
@@ -216,7 +216,7 @@ fn a_session_begins_with_a_hello_and_loses_nothing() {
 
 #[test]
 fn frames_that_the_pc_misses_are_counted() {
-    let mut bench = Bench::new();
+    let mut bench = LinkedDevice::new();
     let _ = bench.send(Command::Hello { version: PROTOCOL_VERSION });
     bench.run(3_200, |_| 0);
     bench.drain();
@@ -233,7 +233,7 @@ fn frames_that_the_pc_misses_are_counted() {
 
 #[test]
 fn a_repeated_command_is_answered_again_and_carried_out_once() {
-    let mut bench = Bench::new();
+    let mut bench = LinkedDevice::new();
     let _ = bench.send(Command::Hello { version: PROTOCOL_VERSION });
     let start = bench.bytes(Command::Start);
     for _ in 0..3 {
@@ -249,7 +249,7 @@ fn a_repeated_command_is_answered_again_and_carried_out_once() {
 
 #[test]
 fn torque_and_configuration_exclude_each_other() {
-    let mut bench = Bench::new();
+    let mut bench = LinkedDevice::new();
     let _ = bench.send(Command::Hello { version: PROTOCOL_VERSION });
     assert_eq!(bench.send(Command::ConfigurePatient(Patient::default())), Ok(()));
     assert_eq!(bench.send(Command::Start), Ok(()));
@@ -265,9 +265,9 @@ fn torque_and_configuration_exclude_each_other() {
 
 #[test]
 fn a_patient_never_changes_the_device_but_may_be_dismissed() {
-    let mut bench = Bench::new();
+    let mut bench = LinkedDevice::new();
     let _ = bench.send(Command::Hello { version: PROTOCOL_VERSION });
-    let ask = |bench: &mut Bench, command: Command| {
+    let ask = |bench: &mut LinkedDevice, command: Command| {
         let bytes = bench.bytes(command);
         bench.device.receive(&bytes);
         bench.drain()
@@ -307,7 +307,7 @@ fn a_patient_never_changes_the_device_but_may_be_dismissed() {
 
 #[test]
 fn a_fault_is_reported_and_again_after_a_reconnection() {
-    let mut bench = Bench::new();
+    let mut bench = LinkedDevice::new();
     let _ = bench.send(Command::Hello { version: PROTOCOL_VERSION });
     assert_eq!(bench.send(Command::Start), Ok(()));
     bench.run(10, |tick| if tick > 5 { 5_000 } else { 0 });
@@ -322,7 +322,7 @@ fn a_fault_is_reported_and_again_after_a_reconnection() {
 
 #[test]
 fn a_fault_is_cleared_only_by_clear_after_a_stop() {
-    let mut bench = Bench::new();
+    let mut bench = LinkedDevice::new();
     let _ = bench.send(Command::Hello { version: PROTOCOL_VERSION });
     assert_eq!(bench.send(Command::Clear), Ok(()), "there is none");
     let _ = bench.send(Command::Stop);
@@ -344,7 +344,7 @@ fn a_fault_is_cleared_only_by_clear_after_a_stop() {
 
 #[test]
 fn a_start_that_a_stop_has_overtaken_gives_no_torque() {
-    let mut bench = Bench::new();
+    let mut bench = LinkedDevice::new();
     let _ = bench.send(Command::Hello { version: PROTOCOL_VERSION });
     let late = bench.bytes(Command::Start);
     assert_eq!(bench.send(Command::Stop), Ok(()));

@@ -16,7 +16,7 @@ use link::frames::{Command, CommandRefusal, DeviceFrame, HostFrame, PROTOCOL_VER
 use link::host::Reception;
 
 /// A device with its control law, a motor that is held, and the PC's end.
-struct Bench {
+struct HeldDevice {
     controller: Controller,
     endpoint: Endpoint,
     reception: Reception,
@@ -26,7 +26,7 @@ struct Bench {
     powered: u64,
 }
 
-impl Bench {
+impl HeldDevice {
     fn new(device: &Device) -> Self {
         let mut config = Config::commissioned_virtual();
         config.device = *device;
@@ -130,7 +130,7 @@ const NOTHING: Result<(), CommandRefusal> = refused(SequenceRefusal::Nothing);
 
 #[test]
 fn an_upload_gives_no_torque_and_a_play_command_does() {
-    let mut bench = Bench::commissioned();
+    let mut bench = HeldDevice::commissioned();
     assert_eq!(bench.upload(&sound()), Ok(()));
     bench.run(5_000);
     assert_eq!(bench.powered, 0, "an upload starts nothing");
@@ -154,7 +154,7 @@ fn a_sequence_that_is_not_what_was_sent_is_refused_whole() {
         ("none", Command::Play { count: 0, checksum: 0 }, count_is(2, 0)),
     ];
     for (what, command, answer) in cases {
-        let mut bench = Bench::commissioned();
+        let mut bench = HeldDevice::commissioned();
         assert_eq!(bench.upload(&sound()), Ok(()));
         assert_eq!(bench.ask(command), answer, "{what}");
         assert_eq!(bench.play(&sound()), NOTHING, "{what}: it is forgotten");
@@ -162,7 +162,7 @@ fn a_sequence_that_is_not_what_was_sent_is_refused_whole() {
         assert_eq!(bench.powered, 0, "{what}");
     }
     let nothing = Command::Play { count: 0, checksum: codec::hash(&[(); 0]) };
-    assert_eq!(Bench::commissioned().ask(nothing), NOTHING);
+    assert_eq!(HeldDevice::commissioned().ask(nothing), NOTHING);
 }
 
 #[test]
@@ -178,7 +178,7 @@ fn a_segment_that_is_refused_takes_the_sequence_along() {
         ("not the next", 2, ramps(1.0, 60)),
         ("no place for it", MAX_SEGMENTS as u8, ramps(1.0, 60)),
     ] {
-        let mut bench = Bench::commissioned();
+        let mut bench = HeldDevice::commissioned();
         bench.must(Command::Segment { index: 0, excitation: ramps(1.0, 60) });
         let answer = bench.ask(Command::Segment { index, excitation: bad });
         let Err(CommandRefusal::Sequence(refusal)) = answer else { panic!("{what}: {answer:?}") };
@@ -192,8 +192,8 @@ fn a_segment_that_is_refused_takes_the_sequence_along() {
 
 #[test]
 fn a_sequence_is_forgotten_at_all_that_comes_between() {
-    type Between = fn(&mut Bench);
-    let hello = |bench: &mut Bench| bench.must(Command::Hello { version: PROTOCOL_VERSION });
+    type Between = fn(&mut HeldDevice);
+    let hello = |bench: &mut HeldDevice| bench.must(Command::Hello { version: PROTOCOL_VERSION });
     let betweens: [(&str, Between); 8] = [
         ("a stop", |bench| bench.must(Command::Stop)),
         ("the end of the session", |bench| {
@@ -227,7 +227,7 @@ fn a_sequence_is_forgotten_at_all_that_comes_between() {
         }),
     ];
     for (what, between) in betweens {
-        let mut bench = Bench::commissioned();
+        let mut bench = HeldDevice::commissioned();
         assert_eq!(bench.upload(&sound()), Ok(()));
         between(&mut bench);
         let powered = bench.powered;
@@ -243,13 +243,13 @@ fn a_sequence_is_forgotten_at_all_that_comes_between() {
 #[test]
 fn a_sequence_that_waits_too_long_is_refused() {
     for (ticks, answer) in [(LATE_TICKS, Ok(())), (LATE_TICKS + 1, refused(SequenceRefusal::Late))] {
-        let mut bench = Bench::commissioned();
+        let mut bench = HeldDevice::commissioned();
         bench.run(1);
         assert_eq!(bench.upload(&sound()), Ok(()));
         bench.run(ticks);
         assert_eq!(bench.play(&sound()), answer, "{ticks} ticks");
     }
-    let mut bench = Bench::commissioned();
+    let mut bench = HeldDevice::commissioned();
     bench.run(1);
     bench.must(Command::Segment { index: 0, excitation: ramps(1.0, 60) });
     bench.run(LATE_TICKS + 1);
@@ -259,7 +259,7 @@ fn a_sequence_that_waits_too_long_is_refused() {
 
 #[test]
 fn nothing_is_uploaded_or_played_while_torque_is_on() {
-    let mut bench = Bench::commissioned();
+    let mut bench = HeldDevice::commissioned();
     assert_eq!(bench.upload(&sound()), Ok(()));
     assert_eq!(bench.play(&sound()), Ok(()));
     for _ in 0..2 {
@@ -275,17 +275,17 @@ fn nothing_is_uploaded_or_played_while_torque_is_on() {
 
 #[test]
 fn a_sequence_plays_in_a_session_without_interlocks_only() {
-    let mut bench = Bench::commissioned();
+    let mut bench = HeldDevice::commissioned();
     bench.endpoint.disconnect();
     assert_eq!(bench.upload(&sound()), Err(CommandRefusal::NoSession));
     assert_eq!(bench.play(&sound()), Err(CommandRefusal::NoSession));
 
-    let mut bench = Bench::commissioned();
+    let mut bench = HeldDevice::commissioned();
     assert_eq!(bench.upload(&sound()), Ok(()));
     bench.endpoint.set_interlocks(Interlocks::of(Interlock::EmergencyStop));
     assert_eq!(bench.play(&sound()), Err(CommandRefusal::Interlocked(Interlock::EmergencyStop)));
 
-    let mut unknown = Bench::new(&Device::default());
+    let mut unknown = HeldDevice::new(&Device::default());
     let gentle = [Excitation {
         servo: Servo { stiffness: Stiffness::default(), damping: Damping::default() },
         ..ramps(1.0, 60)
@@ -299,7 +299,7 @@ fn a_sequence_plays_in_a_session_without_interlocks_only() {
 
 #[test]
 fn a_repeated_command_is_answered_again_and_plays_once() {
-    let mut bench = Bench::commissioned();
+    let mut bench = HeldDevice::commissioned();
     let [first, second] =
         [0, 1].map(|index| Command::Segment { index, excitation: sound()[index as usize].clone() });
     for (id, command) in [(1_000, first), (1_001, second)] {

@@ -6,11 +6,11 @@
 //! written by hand. Lines that a test of the emulated board begins with a bar are printed unchanged
 //! below the table.
 
+mod end_to_end;
 mod fit;
 mod programs;
 mod table;
 mod values;
-mod whole;
 mod work;
 
 use crate::rows::ROWS;
@@ -33,14 +33,14 @@ pub(crate) fn run(names: &[String]) -> Result<(), Error> {
             all.join(" ")
         )));
     }
-    let mut bench = Bench { names, values: Values::new(), board_lines: vec![], errors: vec![] };
+    let mut bench = BenchRun { names, values: Values::new(), board_lines: vec![], errors: vec![] };
     bench.measure_programs();
     bench.measure_whole();
     bench.measure_tests()?;
     let works = work::works(&bench.values);
     bench.values.extend(work::growths(&works));
     bench.name_unmeasured();
-    let Bench { values, board_lines, errors, .. } = bench;
+    let BenchRun { values, board_lines, errors, .. } = bench;
     let rows: Vec<Measured> = ROWS
         .into_iter()
         .filter_map(|row| Some((row, values.get(row.name)?.parse().ok()?, peer(&values, row.name))))
@@ -60,7 +60,7 @@ pub(crate) fn run(names: &[String]) -> Result<(), Error> {
 const TURNS: usize = 3;
 
 /// A run of the bench: the rows that are wanted, and what has been measured.
-struct Bench<'a> {
+struct BenchRun<'a> {
     /// All rows where it has none.
     names: &'a [String],
     values: Values,
@@ -68,7 +68,7 @@ struct Bench<'a> {
     errors: Vec<String>,
 }
 
-impl Bench<'_> {
+impl BenchRun<'_> {
     /// True if a row is wanted whose name begins so.
     fn wants(&self, rows: &str) -> bool {
         self.names.is_empty() || self.names.iter().any(|name| name.starts_with(rows))
@@ -125,11 +125,11 @@ impl Bench<'_> {
     }
 
     fn measure_whole(&mut self) {
-        self.measure(&["build_"], "build", whole::build_time);
-        self.measure(&["packages"], "packages", whole::packages);
-        self.measure(&["firmware_"], "firmware", whole::image);
-        self.measure(&["stream_"], "stream", whole::stream);
-        self.measure(&["diagnose_60s_", "diagnose_peak_"], "diagnosis", whole::diagnosis);
+        self.measure(&["build_"], "build", end_to_end::build_time);
+        self.measure(&["packages"], "packages", end_to_end::packages);
+        self.measure(&["firmware_"], "firmware", end_to_end::image);
+        self.measure(&["stream_"], "stream", end_to_end::stream);
+        self.measure(&["diagnose_60s_", "diagnose_peak_"], "diagnosis", end_to_end::diagnosis);
     }
 
     /// Makes errors of the rows that are wanted and have no value: what printed them may have

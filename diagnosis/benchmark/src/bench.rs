@@ -5,7 +5,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use crate::baselines;
-use crate::dynamics::Bench;
+use crate::dynamics::JudgeDynamics;
 use crate::evidence;
 use crate::generator::case::build;
 use crate::generator::files;
@@ -52,7 +52,7 @@ fn run_case(
     let seconds = start.elapsed().as_secs_f64();
     let key = files::key(&case);
     evidence::collect(options, [&spec.name(), "generator"], &key.effects, &out)?;
-    let bench = Bench::new(&paths, &key);
+    let bench = JudgeDynamics::new(&paths, &key);
     let left = report_residuals::judged(&bench, &out);
     let reported = report_residuals::reported(&paths, &out, &key);
     let record = Record {

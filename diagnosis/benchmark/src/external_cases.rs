@@ -4,7 +4,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use crate::baselines;
-use crate::dynamics::Bench;
+use crate::dynamics::JudgeDynamics;
 use crate::evidence;
 use crate::folder::{self, ExternalCase, Truth};
 use crate::judge::Record;
@@ -84,7 +84,7 @@ fn run_case(
         Truth::Believed(_) => Key::of(Category::Null),
     };
     evidence::collect(options, [&case.id, &case.id], &key.effects, &out)?;
-    let bench = Bench::new(&paths, &key);
+    let bench = JudgeDynamics::new(&paths, &key);
     let left = report_residuals::judged(&bench, &out);
     let reported = report_residuals::reported(&paths, &out, &key);
     let record = Record {

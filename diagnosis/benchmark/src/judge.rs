@@ -2,7 +2,7 @@
 
 use crate::baselines::Opinion;
 use crate::key::{Category, Key};
-use crate::report_residuals::Left;
+use crate::report_residuals::ResidualRms;
 use crate::share::{EXPLAINABLE, share};
 use crate::tool::{Answer, Named};
 
@@ -21,9 +21,9 @@ pub(crate) struct Record {
     pub(crate) answer: Result<Answer, String>,
     /// The residual on the held-out recording by the judge's own inverse dynamics, or why it could
     /// not be computed.
-    pub(crate) left: Result<Left, String>,
+    pub(crate) left: Result<ResidualRms, String>,
     /// The same by the report's own residuals.
-    pub(crate) reported: Option<Left>,
+    pub(crate) reported: Option<ResidualRms>,
     pub(crate) opinions: Vec<Opinion>,
     pub(crate) seconds: f64,
     /// The drive's gain as the rig has it.
@@ -233,7 +233,7 @@ pub(crate) mod tests {
             id: "1".into(),
             key,
             answer: Ok(answer),
-            left: Ok(Left { refit: 2.0, patched: 1.0 }),
+            left: Ok(ResidualRms { refit: 2.0, patched: 1.0 }),
             reported: None,
             opinions: Vec::new(),
             seconds: 1.0,
@@ -318,13 +318,13 @@ pub(crate) mod tests {
         // From 2² to 1², which is what the oracle leaves.
         assert_eq!(r.gain(), Some(1.0));
         assert_eq!(r.reported_gain(), Some(Gain::default()), "it reports no residuals");
-        r.left = Ok(Left { refit: 2.0, patched: 1.5 });
+        r.left = Ok(ResidualRms { refit: 2.0, patched: 1.5 });
         assert_eq!(r.gain(), Some(1.75 / 3.0));
         // The tool's own noise counts against it in one of the two figures of its report.
-        r.reported = Some(Left { refit: 10.0_f64.sqrt(), patched: 7.0_f64.sqrt() });
+        r.reported = Some(ResidualRms { refit: 10.0_f64.sqrt(), patched: 7.0_f64.sqrt() });
         let gain = r.reported_gain().unwrap();
         assert!((gain.of_oracle - 1.0).abs() < 1e-9 && (gain.of_own - 1.0 / 3.0).abs() < 1e-9, "{gain:?}");
-        r.left = Ok(Left { refit: 1.05, patched: 1.0 });
+        r.left = Ok(ResidualRms { refit: 1.05, patched: 1.0 });
         assert_eq!(r.gain(), None, "nothing to get on the rows that are judged");
         r.left = Err("a law that the judge does not know".into());
         assert_eq!(r.gain(), None);

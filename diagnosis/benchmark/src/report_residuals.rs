@@ -3,14 +3,14 @@
 
 use std::path::Path;
 
-use crate::dynamics::Bench;
+use crate::dynamics::JudgeDynamics;
 use crate::key::{Key, Oracle};
 use crate::signal::{Butterworth, rms};
 use crate::tool::Paths;
 
 /// Rms on the held-out recordings, in the oracle's band.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Left {
+pub(crate) struct ResidualRms {
     pub(crate) refit: f64,
     pub(crate) patched: f64,
 }
@@ -19,13 +19,13 @@ pub(crate) struct Left {
 const FEWEST_ROWS: usize = 200;
 
 /// By the judge's `bench`.
-pub(crate) fn judged(bench: &Result<Bench, String>, out: &Path) -> Result<Left, String> {
+pub(crate) fn judged(bench: &Result<JudgeDynamics, String>, out: &Path) -> Result<ResidualRms, String> {
     let bench = bench.as_ref().map_err(Clone::clone)?;
-    Ok(Left { patched: bench.patched(&out.join("patched-rig.toml"))?, refit: bench.refit() })
+    Ok(ResidualRms { patched: bench.patched(&out.join("patched-rig.toml"))?, refit: bench.refit() })
 }
 
 /// By the report in `out`; nothing where the key has no oracle.
-pub(crate) fn reported(paths: &Paths, out: &Path, key: &Key) -> Option<Left> {
+pub(crate) fn reported(paths: &Paths, out: &Path, key: &Key) -> Option<ResidualRms> {
     let holdout = paths.holdout.first()?.file_name()?;
     measure(&out.join("residuals.csv"), &holdout.to_string_lossy(), key.oracle.as_ref()?).ok()
 }
@@ -34,7 +34,7 @@ pub(crate) fn reported(paths: &Paths, out: &Path, key: &Key) -> Option<Left> {
 ///
 /// # Errors
 /// What is missing or too short.
-pub(crate) fn measure(file: &Path, holdout: &str, oracle: &Oracle) -> Result<Left, String> {
+pub(crate) fn measure(file: &Path, holdout: &str, oracle: &Oracle) -> Result<ResidualRms, String> {
     let text = std::fs::read_to_string(file).map_err(|e| format!("no residuals.csv: {e}"))?;
     let mut lines = text.lines();
     let head: Vec<&str> = lines.next().unwrap_or("").split(',').map(str::trim).collect();
@@ -64,7 +64,7 @@ pub(crate) fn measure(file: &Path, holdout: &str, oracle: &Oracle) -> Result<Lef
 
 /// The same for rows in hand: time, and the residuals under refit and patched model; `None` at
 /// rest.
-pub(crate) fn measure_rows(rows: &[(f64, Option<[f64; 2]>)], oracle: &Oracle) -> Left {
+pub(crate) fn measure_rows(rows: &[(f64, Option<[f64; 2]>)], oracle: &Oracle) -> ResidualRms {
     let start = rows[0].0;
     let rate = (rows.len() - 1) as f64 / (rows[rows.len() - 1].0 - start);
     let judged: Vec<bool> = rows
@@ -83,7 +83,7 @@ pub(crate) fn measure_rows(rows: &[(f64, Option<[f64; 2]>)], oracle: &Oracle) ->
         let kept: Vec<f64> = filtered.into_iter().zip(&judged).filter(|(_, k)| **k).map(|(x, _)| x).collect();
         rms(&kept)
     };
-    Left { refit: band(0), patched: band(1) }
+    ResidualRms { refit: band(0), patched: band(1) }
 }
 
 #[cfg(test)]

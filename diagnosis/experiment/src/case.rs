@@ -84,7 +84,7 @@ impl Case {
         let report = report(folder)?;
         let rivals = rivals(folder, &report)?;
         let rig = &rivals[0].rig;
-        let shown = Shown::read(&folder.join("residuals.csv"))?;
+        let shown = ShownMotion::read(&folder.join("residuals.csv"))?;
         let of_drive = rig.actuator.limit.map(|limit| (limit * rig.actuator.gain).abs());
         let force = force.or(of_drive).ok_or_else(|| {
             format!(
@@ -171,7 +171,7 @@ fn is_other(effect: &diagnosis::report::Named, name: &str) -> bool {
 }
 
 /// The motion that the report's recordings showed.
-struct Shown {
+struct ShownMotion {
     /// Farthest ahead of where a recording began, and behind it.
     ahead: f64,
     behind: f64,
@@ -180,7 +180,7 @@ struct Shown {
     reading_s: f64,
 }
 
-impl Shown {
+impl ShownMotion {
     /// Reads the residuals of a report, of which each recording has a speed at each time.
     fn read(path: &Path) -> Result<Self, String> {
         let text = std::fs::read_to_string(path).map_err(|cause| {
@@ -232,7 +232,7 @@ mod tests {
         }
         let path = std::env::temp_dir().join(format!("residuals-{}.csv", std::process::id()));
         std::fs::write(&path, csv).expect("there is space");
-        let shown = Shown::read(&path).expect("rows");
+        let shown = ShownMotion::read(&path).expect("rows");
         std::fs::remove_file(&path).expect("it was written");
         let near = |a: f64, b: f64| (a - b).abs() < 0.05;
         assert!(near(shown.ahead, 3.0) && near(shown.behind, 1.0), "{} {}", shown.ahead, shown.behind);

@@ -104,13 +104,13 @@ fn criterion(rivals: &[Rival], nats: &[Vec<f64>]) -> f64 {
 }
 
 /// The case with its filter and servo, in which inputs are judged.
-struct Bench<'a> {
+struct InputJudge<'a> {
     case: &'a Case,
     filter: Filter,
     servo: Servo,
 }
 
-impl Bench<'_> {
+impl InputJudge<'_> {
     /// The motion of each rival; none if one leaves the limits.
     fn motions(&self, input: &Input) -> Option<Vec<Prediction>> {
         let (rivals, usable) = (&self.case.rivals, self.case.limits.usable());
@@ -215,7 +215,7 @@ fn best(all: impl Iterator<Item = (usize, f64, f64)>) -> Option<(usize, f64, f64
 /// One sentence if every input of the library leaves the limits.
 pub fn design(case: &Case, most_s: f64, seed: u64) -> Result<Design, String> {
     let servo = Servo::within(case.rivals[0].rig.model.inertia, &case.limits.usable());
-    let bench = Bench { case, filter: Filter::new(case), servo };
+    let bench = InputJudge { case, filter: Filter::new(case), servo };
     let segments: Vec<Segment> =
         candidates(case, seed).into_iter().filter(|segment| segment.seconds <= most_s).collect();
     let tried = segments.len();

@@ -41,11 +41,11 @@ const WITNESS: f64 = 10.0;
 /// Standard errors that are reported for a gain without any spread.
 const SUREST: f64 = 100.0;
 /// Neighbouring segments that are taken together.
-const TOGETHER: usize = 3;
+const SEGMENTS_A_BLOCK: usize = 3;
 
 /// Sum of gains with a block-bootstrap interval of 95 %.
 pub fn bootstrap(gains: &[f64]) -> Gain {
-    let blocks: Vec<f64> = gains.chunks(TOGETHER).map(|c| c.iter().sum()).collect();
+    let blocks: Vec<f64> = gains.chunks(SEGMENTS_A_BLOCK).map(|c| c.iter().sum()).collect();
     let n = blocks.len();
     let sum: f64 = blocks.iter().sum();
     let mut random = Random::new(0x9E37_79B9_7F4A_7C15);

@@ -39,6 +39,9 @@ pub(crate) const STRETCHES: usize = 20;
 /// example.
 pub(crate) const SPREAD: f64 = 0.5;
 pub(crate) const GAIN_SPREAD: f64 = 0.1;
+/// Factor by which the rig may have the inertia wrong, when a load's is bounded: the contract's
+/// example declares a half.
+pub(crate) const INERTIA_REACH: f64 = 1.0 + SPREAD;
 /// Power of the drive's force over the inertial force's below which something else moves the axis:
 /// a drive that does it alone supplies at least all of it.
 pub(crate) const UNDRIVEN: f64 = 0.25;

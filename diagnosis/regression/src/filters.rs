@@ -75,23 +75,23 @@ pub(crate) fn first_order(x: &[f64], h: f64, lag_s: f64) -> Vec<f64> {
 /// Returns the derivative by differences of fourth order, lower at the ends.
 pub(crate) fn derivative(x: &[f64], h: f64) -> Vec<f64> {
     let n = x.len();
-    let at = |i: usize| match i {
+    let difference = |i: usize| match i {
         0 => (x[1] - x[0]) / h,
         _ if i + 1 == n => (x[i] - x[i - 1]) / h,
         _ if i < 2 || i + 2 >= n => (x[i + 1] - x[i - 1]) / (2.0 * h),
         _ => (8.0 * (x[i + 1] - x[i - 1]) - (x[i + 2] - x[i - 2])) / (12.0 * h),
     };
-    if n < 2 { vec![0.0; n] } else { (0..n).map(at).collect() }
+    if n < 2 { vec![0.0; n] } else { (0..n).map(difference).collect() }
 }
 
 /// Returns the second difference over h², repeated at the ends.
 pub(crate) fn second_difference(x: &[f64], h: f64) -> Vec<f64> {
     let n = x.len();
-    let at = |i: usize| {
+    let curvature = |i: usize| {
         let i = i.clamp(1, n - 2);
         (x[i + 1] - 2.0 * x[i] + x[i - 1]) / (h * h)
     };
-    if n < 3 { vec![0.0; n] } else { (0..n).map(at).collect() }
+    if n < 3 { vec![0.0; n] } else { (0..n).map(curvature).collect() }
 }
 
 /// Returns the mean of `x` under the hat of half width h, as if straight between points curved by

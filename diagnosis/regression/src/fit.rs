@@ -222,8 +222,8 @@ impl<'a> Model<'a> {
 /// equal, 0.4 if one is 2.5 times the other.
 pub(crate) fn agreement(columns: &[Vec<f64>], a: &[f64], b: &[f64]) -> f64 {
     let force = |values: &[f64]| {
-        let at = |k: usize| columns.iter().zip(values).map(|(c, v)| c[k] * v).sum();
-        (0..columns.first().map_or(0, Vec::len)).map(at).collect::<Vec<f64>>()
+        let rows = 0..columns.first().map_or(0, Vec::len);
+        rows.map(|k| columns.iter().zip(values).map(|(c, v)| c[k] * v).sum()).collect::<Vec<f64>>()
     };
     let (f, g) = (force(a), force(b));
     dot(&f, &g) / (dot(&f, &f).max(dot(&g, &g)) + 1e-300)
@@ -232,11 +232,11 @@ pub(crate) fn agreement(columns: &[Vec<f64>], a: &[f64], b: &[f64]) -> f64 {
 /// Amplitudes of pairs of columns, meaned over recordings.
 fn mean_amplitudes(values: &[f64], count: usize) -> Vec<f64> {
     let recordings = values.len() / count;
-    let one = |pair: usize| {
+    let mean_amplitude = |pair: usize| {
         let all = values.chunks(count).map(|v| v[2 * pair].hypot(v[2 * pair + 1]));
         all.sum::<f64>() / recordings as f64
     };
-    (0..count / 2).map(one).collect()
+    (0..count / 2).map(mean_amplitude).collect()
 }
 
 /// The rows of a recording.
@@ -338,16 +338,22 @@ fn plain(columns: &[Vec<f64>], y: &[f64]) -> Vec<f64> {
     Factor::new(&e.left).solve(&e.right)
 }
 
+/// The equations of the folds that are kept.
+fn added(folds: &[Equations], keep: &dyn Fn(usize) -> bool) -> Equations {
+    let n = folds[0].right.len();
+    let mut sum = Equations { left: Square::zero(n), right: vec![0.0; n] };
+    for e in folds.iter().enumerate().filter(|(k, _)| keep(*k)).map(|(_, e)| e) {
+        sum.left.a.iter_mut().zip(&e.left.a).for_each(|(s, x)| *s += x);
+        sum.right.iter_mut().zip(&e.right).for_each(|(s, x)| *s += x);
+    }
+    sum
+}
+
 /// Solves with each fold left out, for all and for two halves.
 fn solve(p: &Problem, columns: &[&[Vec<f64>]], y: &[f64], folds: &[Equations]) -> Fitted {
     let rows_a_frame = p.tiling.fit_rows as f64 / p.tiling.fit_frames.max(1) as f64;
     let values = |keep: &dyn Fn(usize) -> bool| {
-        let n = folds[0].right.len();
-        let mut sum = Equations { left: Square::zero(n), right: vec![0.0; n] };
-        for e in folds.iter().enumerate().filter(|(k, _)| keep(*k)).map(|(_, e)| e) {
-            sum.left.a.iter_mut().zip(&e.left.a).for_each(|(s, x)| *s += x);
-            sum.right.iter_mut().zip(&e.right).for_each(|(s, x)| *s += x);
-        }
+        let mut sum = added(folds, keep);
         add_prior(p, &mut sum, rows_a_frame);
         Factor::new(&sum.left).solve(&sum.right)
     };

@@ -15,7 +15,7 @@ pub(crate) fn cubic(stamps: &[f64], x: &[f64], at: &[f64]) -> Vec<f64> {
         }
     };
     let mut j = 0;
-    let one = |t: &f64| {
+    let hermite = |t: &f64| {
         while j + 2 < n && stamps[j + 1] <= *t {
             j += 1;
         }
@@ -24,21 +24,21 @@ pub(crate) fn cubic(stamps: &[f64], x: &[f64], at: &[f64]) -> Vec<f64> {
         let (m0, m1, d) = (slope(j) * w, slope(j + 1) * w, x[j + 1] - x[j]);
         x[j] + s * (m0 + s * (3.0 * d - 2.0 * m0 - m1 + s * (m0 + m1 - 2.0 * d)))
     };
-    at.iter().map(one).collect()
+    at.iter().map(hermite).collect()
 }
 
 /// Returns `x`, known at `stamps`, at the increasing times `at`, by straight lines; ends are held.
 pub(crate) fn linear(stamps: &[f64], x: &[f64], at: &[f64]) -> Vec<f64> {
     let n = stamps.len();
     let mut j = 0;
-    let one = |t: &f64| {
+    let straight = |t: &f64| {
         while j + 2 < n && stamps[j + 1] <= *t {
             j += 1;
         }
         let s = ((t - stamps[j]) / (stamps[j + 1] - stamps[j])).clamp(0.0, 1.0);
         x[j] + s * (x[j + 1] - x[j])
     };
-    at.iter().map(one).collect()
+    at.iter().map(straight).collect()
 }
 
 /// Integral of the hat (1 − |x|/h)/h from 0 to `x`.
@@ -52,7 +52,7 @@ fn hat_area(x: f64, h: f64) -> f64 {
 pub(crate) fn mean_under_hat(stamps: &[f64], command: &[f64], at: &[f64], h: f64) -> Vec<f64> {
     let n = stamps.len();
     let mut first = 0;
-    let one = |t: &f64| {
+    let mean = |t: &f64| {
         while first + 1 < n && stamps[first + 1] <= t - h {
             first += 1;
         }
@@ -70,7 +70,7 @@ pub(crate) fn mean_under_hat(stamps: &[f64], command: &[f64], at: &[f64], h: f64
         }
         sum
     };
-    at.iter().map(one).collect()
+    at.iter().map(mean).collect()
 }
 
 /// Returns the standard deviation of a count's quantisation; zero if readings are not whole.

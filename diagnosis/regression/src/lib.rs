@@ -98,7 +98,7 @@ pub fn propose(rig: &Rig, recordings: &[Recording]) -> Result<Proposals, Refusal
     };
     let errors = (0..=rounds.len()).map(error).collect();
     let hypotheses = rounds.iter().zip(evidence).map(|(round, evidence)| {
-        let one = |(scored, evidence): (&selection::Scored, Evidence)| {
+        let hypothesis = |(scored, evidence): (&selection::Scored, Evidence)| {
             let candidate = &search.candidates[scored.candidate];
             Hypothesis {
                 law: candidate.law,
@@ -108,7 +108,7 @@ pub fn propose(rig: &Rig, recordings: &[Recording]) -> Result<Proposals, Refusal
                 evidence,
             }
         };
-        round.ranked.iter().zip(evidence).map(one).collect()
+        round.ranked.iter().zip(evidence).map(hypothesis).collect()
     });
     Ok(Proposals { rounds: hypotheses.collect(), errors, band_hz })
 }

@@ -103,8 +103,7 @@ impl Problem {
         // Where masked, what is seen of the acceleration goes; the readings' noise stays.
         let acceleration = |s: &Signals| {
             let (raw, seen) = (second_difference(&s.q_raw, s.h), second_difference(&s.q, s.h));
-            let one = |i: usize| if s.masked[i] { raw[i] - seen[i] } else { raw[i] };
-            (0..s.len()).map(one).collect()
+            (0..s.len()).map(|i| if s.masked[i] { raw[i] - seen[i] } else { raw[i] }).collect()
         };
         let mut all = vec![term(self.whole(acceleration), rig.inertia)];
         if let Some(value) = rig.viscous {
@@ -141,12 +140,12 @@ impl Problem {
 
     /// White readings through the second difference, thinned.
     fn reading_variance(&self, inertia: f64) -> Vec<f64> {
-        let one = |row: &crate::tiles::Row| {
+        let variance = |row: &crate::tiles::Row| {
             let s = &self.signals[row.recording];
             let gain = inertia * (2.0 - 2.0 * (TAU * row.hz * s.h).cos()) / (s.h * s.h);
             (gain * s.noise).powi(2) / self.tiling.cuts[row.recording].stride as f64
         };
-        self.tiling.rows.iter().map(one).collect()
+        self.tiling.rows.iter().map(variance).collect()
     }
 
     /// Works out the force that the motion asks for; laws of the command follow from it.
@@ -200,14 +199,6 @@ impl Problem {
         let m = &self.machine;
         self.of_laws(|i| {
             let s = &m.states[i];
-            let sines = |x: Vec<f64>, by: &[f64]| -> Vec<Vec<f64>> {
-                let wave = |n: i32| {
-                    (0..x.len())
-                        .map(|k| by[k] * (f64::from(n) * 0.5 * TAU * x[k].clamp(-1.0, 1.0)).cos())
-                        .collect()
-                };
-                (1..=4).map(wave).collect()
-            };
             let ones = vec![1.0; s.q.len()];
             let speed = s.each(|k| s.v[k].abs() / m.scales.fast);
             let place = s.each(|k| 0.5 * ((s.q[k] - m.scales.middle) / m.scales.half_travel + 1.0));
@@ -215,10 +206,16 @@ impl Problem {
             let time = s.each(|k| s.t[k] / m.scales.seconds);
             let mut all = Vec::new();
             for x in [speed, place, since, time] {
-                all.extend(sines(x.clone(), &ones));
-                all.extend(sines(x, &s.direction));
+                all.extend(cosines(&x, &ones));
+                all.extend(cosines(&x, &s.direction));
             }
             all
         })
     }
+}
+
+/// Four cosines of `x`, of half periods over its range of one, times `by`.
+fn cosines(x: &[f64], by: &[f64]) -> Vec<Vec<f64>> {
+    let wave = |n: i32, x: f64| (f64::from(n) * 0.5 * TAU * x.clamp(-1.0, 1.0)).cos();
+    (1..=4).map(|n| x.iter().zip(by).map(|(x, by)| by * wave(n, *x)).collect()).collect()
 }

@@ -1,9 +1,11 @@
 //! Forward selection on left-out frames of the fit: the law with the largest share goes in.
 
-use crate::constants::{LEAST_SHARE, LINE_STEPS, NEXT_WAVE, REFINED, RIVALS, ROUNDS, SIZES_AGREE, WAVES};
+use crate::constants::{
+    INERTIA_REACH, LEAST_SHARE, LINE_STEPS, NEXT_WAVE, REFINED, RIVALS, ROUNDS, SIZES_AGREE, WAVES,
+};
 use crate::evidence::{Evidence, HeldOut, compare, over_error};
 use crate::fit::{Fitted, Model, agreement, expanded};
-use crate::laws::{self, ActsOn, Law, Shape, Size};
+use crate::laws::{self, ActsOn, Law, Quantity, Shape};
 use crate::problem::{Candidate, Problem};
 use numerics::golden_section::golden;
 use numerics::parallel;
@@ -213,7 +215,7 @@ impl Search {
         let before = constant.map_or(&model.fitted.error, |bare| &bare.fitted.error);
         let (share, gains) = compare(p, before, &fitted.error, 0);
         let start = model.fitted.values.len();
-        let of = |values: &[f64]| values[start..].to_vec();
+        let added = |values: &[f64]| values[start..].to_vec();
         let agreement = match constant {
             Some(_) => same_sign(&model.fitted.values[p.nominal.len()..p.nominal.len() + p.fit_recordings]),
             None => {
@@ -222,21 +224,35 @@ impl Search {
                     c.iter().zip(&model.root).take(p.tiling.fit_rows).map(|(x, r)| x * r).collect()
                 };
                 let columns: Vec<Vec<f64>> = columns.iter().map(weigh).collect();
-                agreement(&columns, &of(&fitted.halves[0]), &of(&fitted.halves[1]))
+                agreement(&columns, &added(&fitted.halves[0]), &added(&fitted.halves[1]))
             }
         };
-        let coefficients = of(&fitted.values);
+        let coefficients = added(&fitted.values);
         let valid = share > 0.0 && agreement >= SIZES_AGREE && self.has_its_size(new, coefficients[0]);
         Scored { candidate, share, gains, agreement, coefficients, valid }
     }
 
-    fn has_its_size(&self, new: &Candidate, size: f64) -> bool {
-        let within = |unit: f64, low: f64, high: f64| size > low * unit && size < high * unit;
-        match new.law.size {
-            Size::Any => true,
-            Size::Positive => size > 0.0,
-            Size::OfShape(low, high) => within(new.shapes[0].value, low, high),
-            Size::OfInertia(low, high) => within(self.problem.machine.rig.inertia.nominal, low, high),
+    /// True if the first coefficient, the force that the drive supplies, is within its bounds.
+    fn has_its_size(&self, new: &Candidate, coefficient: f64) -> bool {
+        let inertia = self.problem.machine.rig.inertia.nominal;
+        let bounds = new.law.bounds_of(0);
+        let within = |x: f64, low: f64, high: f64| x > low && x < high;
+        let within_bounds = |x: f64| within(x, bounds.low, bounds.high);
+        match bounds.of {
+            Quantity::One => within_bounds(coefficient),
+            Quantity::Shape => within_bounds(coefficient / new.shapes[0].value),
+            Quantity::Jumps => within_bounds(coefficient / inertia),
+            Quantity::MotorInertia => {
+                let part = |ratio: f64| ratio / (1.0 + ratio);
+                let (low, high) = (part(bounds.low) / INERTIA_REACH, part(bounds.high) * INERTIA_REACH);
+                within(coefficient / inertia, low, high)
+            }
+            // Of the force that the motion asks for; as a part of the drive's it is less.
+            Quantity::SmallestGain | Quantity::LargestGain | Quantity::TrustedGain => {
+                within_bounds(coefficient / (1.0 + coefficient.abs()))
+            }
+            // The friction is fitted beside the law, from another moment or mean than the filter's.
+            Quantity::TwiceViscous | Quantity::TwiceDry | Quantity::LargestDry => true,
         }
     }
 
@@ -248,31 +264,36 @@ impl Search {
     }
 
     fn evidence_of(&self, round: &Round, free: &[Vec<f64>]) -> Vec<Evidence> {
-        let p = &self.problem;
         let model = self.model(&round.before);
+        parallel::map(round.ranked.len(), |place| self.evidence_at(round, place, &model, free))
+    }
+
+    /// The evidence for the law at a place of a round; that for all but its first ones does not
+    /// read the holdout.
+    fn evidence_at(&self, round: &Round, place: usize, model: &Model, free: &[Vec<f64>]) -> Evidence {
+        let p = &self.problem;
         let noise = p.reading[..p.tiling.fit_rows].iter().sum::<f64>();
-        let one = |place: usize| {
-            let scored = &round.ranked[place];
-            let candidate = &self.candidates[scored.candidate];
-            let fitted = model.with(candidate);
-            let rival = &round.ranked[if place == 0 { 1.min(round.ranked.len() - 1) } else { 0 }];
-            let ahead: Vec<f64> = scored.gains.iter().zip(&rival.gains).map(|(a, b)| a - b).collect();
+        let scored = &round.ranked[place];
+        let candidate = &self.candidates[scored.candidate];
+        let fitted = model.with(candidate);
+        let rival = &round.ranked[if place == 0 { 1.min(round.ranked.len() - 1) } else { 0 }];
+        let ahead: Vec<f64> = scored.gains.iter().zip(&rival.gains).map(|(a, b)| a - b).collect();
+        let unweighted = fitted.error.iter().zip(&model.root).map(|(e, r)| (e / r).powi(2)).sum::<f64>();
+        let printed = place <= RIVALS;
+        let free_form_more = || {
             let with_free = [expanded(p, candidate, 0..p.fit_recordings), free.to_vec()].concat();
-            let unweighted = fitted.error.iter().zip(&model.root).map(|(e, r)| (e / r).powi(2)).sum::<f64>();
-            let printed = place <= RIVALS;
-            let more = |after: Fitted| compare(p, &fitted.error, &after.error, 0).0.max(0.0);
-            Evidence {
-                share: scored.share,
-                z: over_error(&scored.gains),
-                size_agreement: scored.agreement,
-                lead_z: over_error(&ahead),
-                free_form_more: if printed { more(model.with_columns(&with_free)) } else { f64::NAN },
-                residual_over_noise: (unweighted / (noise + 1e-300)).sqrt(),
-                rows: p.tiling.fit_rows as f64,
-                held_out: printed.then(|| self.held_out(&model, candidate, &fitted)),
-            }
+            compare(p, &fitted.error, &model.with_columns(&with_free).error, 0).0.max(0.0)
         };
-        parallel::map(round.ranked.len(), one)
+        Evidence {
+            share: scored.share,
+            z: over_error(&scored.gains),
+            size_agreement: scored.agreement,
+            lead_z: over_error(&ahead),
+            free_form_more: if printed { free_form_more() } else { f64::NAN },
+            residual_over_noise: (unweighted / (noise + 1e-300)).sqrt(),
+            rows: p.tiling.fit_rows as f64,
+            held_out: printed.then(|| self.held_out(model, candidate, &fitted)),
+        }
     }
 
     fn held_out(&self, model: &Model, candidate: &Candidate, fitted: &Fitted) -> HeldOut {

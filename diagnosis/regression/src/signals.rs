@@ -129,7 +129,7 @@ fn direction(v: &[f64], masked: &[bool]) -> Vec<f64> {
         _ if i == n => v[n - 1],
         _ => 0.5 * (v[i - 1] + v[i]),
     };
-    let one = |i: usize| {
+    let direction = |i: usize| {
         let (l, r) = (middle(i), middle(i + 1));
         match masked[i] {
             true => 0.0,
@@ -137,17 +137,17 @@ fn direction(v: &[f64], masked: &[bool]) -> Vec<f64> {
             false => (l + r) / (l.abs() + r.abs() + 1e-300),
         }
     };
-    (0..n).map(one).collect()
+    (0..n).map(direction).collect()
 }
 
 /// The travel since the axis last turned round; a masked stretch belongs to the way before it.
 fn since_reversal(q: &[f64], v: &[f64], masked: &[bool]) -> Vec<f64> {
     let (mut way, mut start) = (0.0, q[0]);
-    let one = |i: usize| {
+    let travel = |i: usize| {
         if !masked[i] && v[i].signum() != way {
             (way, start) = (v[i].signum(), q[i]);
         }
         (q[i] - start).abs()
     };
-    (0..q.len()).map(one).collect()
+    (0..q.len()).map(travel).collect()
 }

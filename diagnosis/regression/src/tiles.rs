@@ -58,10 +58,10 @@ impl Lapped {
     /// Appends the first `kept` coefficients of the frame of 2m points `x`.
     pub(crate) fn frame(&self, x: &[f64], kept: usize, out: &mut Vec<f64>) {
         let (m, half) = (self.m, self.m / 2);
-        let at = |n: usize| x[n] * self.window[n];
+        let windowed = |n: usize| x[n] * self.window[n];
         let folded = |n: usize| match n < half {
-            true => -at(3 * half - 1 - n) - at(3 * half + n),
-            false => at(n - half) - at(3 * half - 1 - n),
+            true => -windowed(3 * half - 1 - n) - windowed(3 * half + n),
+            false => windowed(n - half) - windowed(3 * half - 1 - n),
         };
         let start = |n: usize| multiply((folded(2 * n), folded(m - 1 - 2 * n)), self.twiddle[n]);
         let mut z: Vec<(f64, f64)> = (0..half).map(start).collect();
@@ -149,8 +149,9 @@ impl Tiling {
         let smooth = low_pass(x, rate_hz / step as f64, self.band_hz, 4);
         let m = cut.lapped.m;
         let last = smooth.len().saturating_sub(1);
-        let at = |i: usize| smooth.get((cut.edge + i * cut.stride) / step).or(smooth.get(last));
-        let thinned: Vec<f64> = (0..(cut.frames + 1) * m).map(|i| at(i).copied().unwrap_or(0.0)).collect();
+        let places = (0..(cut.frames + 1) * m).map(|i| (cut.edge + i * cut.stride) / step);
+        let thinned: Vec<f64> =
+            places.map(|i| smooth.get(i).or(smooth.get(last)).copied().unwrap_or(0.0)).collect();
         for frame in 0..cut.frames {
             cut.lapped.frame(&thinned[frame * m..(frame + 2) * m], cut.kept, out);
         }

@@ -154,13 +154,14 @@ impl Recording {
     /// Checks the text of a recording; `file` is what errors call it.
     pub fn parse(text: &str, file: &str) -> Result<Self, InputError> {
         let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-        let at = |(line, what): (usize, String)| InputError::new(format!("{file}, line {line}: {what}"));
+        let error_at =
+            |(line, what): (usize, String)| InputError::new(format!("{file}, line {line}: {what}"));
         let mut lines = text.lines();
         let header = lines.next().unwrap_or("");
-        let mut rows = Rows::new(header).map_err(|what| at((1, what)))?;
+        let mut rows = Rows::new(header).map_err(|what| error_at((1, what)))?;
         rows.reserve(text.len() / header.len().max(12));
         for (index, row) in lines.enumerate() {
-            rows.push(index + 2, row).map_err(at)?;
+            rows.push(index + 2, row).map_err(error_at)?;
         }
         let place = rows.place;
         let [time_s, command, position_counts, tilt, reference, force] = rows.columns;

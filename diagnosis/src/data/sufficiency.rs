@@ -31,20 +31,22 @@ pub(crate) fn too_little(fit: &[Recording], holdout: &[Recording]) -> Option<Str
             &enough.map(|recording| recording.file.as_str()).collect::<Vec<_>>(),
         ));
     }
-    let pooled = |all: &[Recording], least: f64, what: &str| {
-        let seconds: f64 = all.iter().map(Recording::duration_s).sum();
-        let rows: usize = all.iter().map(Recording::len).sum();
-        let files: Vec<&str> = all.iter().map(|recording| recording.file.as_str()).collect();
-        (seconds < least || rows < FEWEST_ROWS).then(|| {
-            format!(
-                "{} {} {seconds:.2} s and {rows} rows {what} where at least {:.0} s and {FEWEST_ROWS} rows are needed (are its times in seconds?)",
-                files.join(", "),
-                if all.len() == 1 { "lasts" } else { "last" },
-                least.ceil()
-            )
-        })
-    };
-    pooled(fit, SHORTEST_S, "to fit on").or_else(|| pooled(holdout, SHORTEST_HOLDOUT_S, "to judge by"))
+    together(fit, SHORTEST_S, "to fit on").or_else(|| together(holdout, SHORTEST_HOLDOUT_S, "to judge by"))
+}
+
+/// The reason why recordings together do not suffice for `what`, which needs `least` s.
+fn together(all: &[Recording], least: f64, what: &str) -> Option<String> {
+    let seconds: f64 = all.iter().map(Recording::duration_s).sum();
+    let rows: usize = all.iter().map(Recording::len).sum();
+    let files: Vec<&str> = all.iter().map(|recording| recording.file.as_str()).collect();
+    (seconds < least || rows < FEWEST_ROWS).then(|| {
+        format!(
+            "{} {} {seconds:.2} s and {rows} rows {what} where at least {:.0} s and {FEWEST_ROWS} rows are needed (are its times in seconds?)",
+            files.join(", "),
+            if all.len() == 1 { "lasts" } else { "last" },
+            least.ceil()
+        )
+    })
 }
 
 /// A sentence on a recording that cannot be used, with the files that still could.
@@ -190,10 +192,10 @@ mod tests {
 
     #[test]
     fn a_position_that_comes_back_reverses() {
-        let of = |place: fn(f64) -> f64| reversals(&under(0.0, place).position_counts);
-        assert_eq!(of(|t| t), 0);
-        assert_eq!(of(|t| t + 0.002 * (90.0 * t).sin()), 0, "a cogging motor runs on");
-        assert_eq!(of(|t| 1.2 * t - t * t), 1);
-        assert_eq!(of(|t| (2.0 * TAU * t).sin()), 4);
+        let turns = |place: fn(f64) -> f64| reversals(&under(0.0, place).position_counts);
+        assert_eq!(turns(|t| t), 0);
+        assert_eq!(turns(|t| t + 0.002 * (90.0 * t).sin()), 0, "a cogging motor runs on");
+        assert_eq!(turns(|t| 1.2 * t - t * t), 1);
+        assert_eq!(turns(|t| (2.0 * TAU * t).sin()), 4);
     }
 }

@@ -78,9 +78,8 @@ impl EffectEvidence {
         self.effect.name.definition().is_of_jumps()
     }
 
-    /// True if it is nearly all that was left out and as large on every recording, or most of it
-    /// and hardly differs between them, and costs nothing in those moments of the held-out ones
-    /// that do not play it, however few do.
+    /// True if (share ≥ 0.9 and sizes within 0.75–1.33) or (share ≥ 0.5 and sizes within
+    /// 0.85–1.18), with no significant loss anywhere on held-out recordings.
     fn agrees_everywhere(&self) -> bool {
         let harms_nowhere = |gain: &Gain| gain.sum > 0.0 && gain.low >= -HARMLESS * gain.sum;
         let is_nearly_all = self.share >= NEARLY_ALL_SHARE && self.is_same_size();

@@ -58,7 +58,7 @@ impl Densities {
 }
 
 /// True if the gain of a form is sure and large enough to be reported.
-pub(crate) fn is_told(taken: &Taken, tracks: &[BlockedRecording]) -> bool {
+pub(crate) fn is_reportable(taken: &Taken, tracks: &[BlockedRecording]) -> bool {
     let blocks: usize = tracks.iter().map(BlockedRecording::block_count).sum();
     taken.gain.is_sure() && taken.gain.sum > 0.5 * FORM_TOLD * blocks as f64
 }
@@ -74,8 +74,8 @@ mod tests {
     /// nothing, nats per unit.
     fn densities(alone: f64, with: f64) -> Densities {
         // A little scatter, as no two units are alike.
-        let of = |sum: f64| Density((0..UNITS).map(|i| sum * (1.0 + 0.3 * (i as f64).sin())).collect());
-        Densities { alone: of(alone), with: vec![(Inputs::Speed, of(with))] }
+        let density = |sum: f64| Density((0..UNITS).map(|i| sum * (1.0 + 0.3 * (i as f64).sin())).collect());
+        Densities { alone: density(alone), with: vec![(Inputs::Speed, density(with))] }
     }
 
     /// True if an effect holds that takes `own` where the form takes `form` and both together

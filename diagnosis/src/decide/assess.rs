@@ -2,15 +2,15 @@
 //! recordings instead.
 
 use crate::data::schema::FitTable;
-use crate::decide::confidence_pass::{Scales, weigh};
+use crate::decide::confidence_pass::{WeighingContext, weigh};
 use crate::decide::diagnosis::Reason;
 use crate::decide::elimination::Found;
 use crate::decide::free_form_check::{self, FreeFormShare, Unnamed};
-use crate::decide::out_of_library::{self, Foreign};
+use crate::decide::out_of_library::{self, UnnamedPhysics};
 use crate::decide::thresholds::MATERIAL;
 use crate::decide::verdict::misfit;
 use crate::decide::weighed_model::WeighedModel;
-use crate::evidence::comparison::Shown;
+use crate::evidence::comparison::ModelComparison;
 use crate::evidence::holdout_set::HoldoutSet;
 use crate::evidence::parameters;
 use crate::evidence::prepared::Prepared;
@@ -32,15 +32,15 @@ pub(crate) struct Assessment {
     /// The model found, its effects weighed.
     pub(crate) weighed: WeighedModel,
     /// The model with the named effects and no other, where that is another one than was weighed.
-    pub(crate) named_alone: Option<Shown>,
+    pub(crate) named_alone: Option<ModelComparison>,
     /// The gain of a force of any form in addition to the named effects.
     pub(crate) beside: Option<FreeFormShare>,
     /// The force of any form that explains most, where nothing is named, and the refit with that
     /// force included.
     pub(crate) unnamed: Option<Unnamed>,
-    pub(crate) with_unnamed: Option<Shown>,
+    pub(crate) with_unnamed: Option<ModelComparison>,
     /// Physics without a name that explains most, where nothing is named.
-    pub(crate) foreign: Option<Foreign>,
+    pub(crate) foreign: Option<UnnamedPhysics>,
 }
 
 impl Assessment {
@@ -60,22 +60,27 @@ pub(crate) fn assess(prepared: &Prepared, found: Found) -> Result<Assessment, Re
     let excitation = Excitation::of(&fit, count, nominal.rig.turn());
     let by_shares = !standing.materials.is_empty();
     let refit = context.fit_shown(Model::default(), &null.noise, by_shares);
-    let scales =
-        Scales { context: &context, refit: &refit, null: &null, holdout: &holdout, excitation: &excitation };
-    let weighed = weigh(&scales, standing);
+    let weighing = WeighingContext {
+        context: &context,
+        refit: &refit,
+        null: &null,
+        holdout: &holdout,
+        excitation: &excitation,
+    };
+    let weighed = weigh(&weighing, standing);
     if let Some(reason) = misfit(&weighed, nominal, is_driven(nominal, &fit)) {
         return Err(reason);
     }
     let (mut weighed, beside) = free_form_check::check(weighed, &context);
-    let named_alone = only_named(&scales, &mut weighed);
+    let named_alone = only_named(&weighing, &mut weighed);
     let nothing_named = weighed.named().is_empty();
     let unnamed =
         nothing_named.then(|| free_form_check::alone(&context, &refit, &holdout, &null.noise)).flatten();
     let (unnamed, fitted) = unnamed.map_or((None, None), |(unnamed, fitted)| (Some(unnamed), fitted));
-    let show = |fitted| Shown::new(&context, &holdout.smoothed, &weighed.estimator, &refit, fitted);
+    let show = |fitted| ModelComparison::new(&context, &holdout.smoothed, &weighed.estimator, &refit, fitted);
     let with_unnamed = fitted.map(show);
     // A form that lowers no error on recordings it was not fitted to explains nothing.
-    let lowers = |shown: &Shown| shown.table.patched.holdout < shown.table.refit.holdout;
+    let lowers = |shown: &ModelComparison| shown.table.patched.holdout < shown.table.refit.holdout;
     let helps = with_unnamed.as_ref().is_none_or(lowers);
     let (unnamed, with_unnamed) = if helps { (unnamed, with_unnamed) } else { (None, None) };
     let foreign = nothing_named.then(|| out_of_library::alone(&context, &refit, &holdout)).flatten();
@@ -102,8 +107,8 @@ pub(super) fn is_material(table: &FitTable) -> bool {
 /// not found, and may be in no patched rig. An effect that has no size without the others is not
 /// named either, nor are effects of the filter that together take no material part off the held-out
 /// force error; those of the regression were judged by that before.
-fn only_named(scales: &Scales, weighed: &mut WeighedModel) -> Option<Shown> {
-    let Scales { context, refit, null, holdout, .. } = *scales;
+fn only_named(weighing: &WeighingContext, weighed: &mut WeighedModel) -> Option<ModelComparison> {
+    let WeighingContext { context, refit, null, holdout, .. } = *weighing;
     let by_shares = !weighed.materials.is_empty();
     loop {
         let named = weighed.named();
@@ -114,11 +119,11 @@ fn only_named(scales: &Scales, weighed: &mut WeighedModel) -> Option<Shown> {
             weighed.weakest_is_immaterial(part_off(&weighed.shown.table));
             continue;
         }
-        let last = &weighed.slow;
+        let last = &weighed.coloured_fit;
         let effects = named.iter().map(|i| last.model.effects[*i].clone()).collect();
         let model = Model { effects, ..last.model.clone() };
-        let slow = context.fit_slow(model, &[&null.noise, &last.noise]);
-        let patched = context.fit_shown(slow.model, &slow.noise, by_shares);
+        let coloured_fit = context.fit_coloured(model, &[&null.noise, &last.noise]);
+        let patched = context.fit_shown(coloured_fit.model, &coloured_fit.noise, by_shares);
         let is_there = |place: usize| {
             let values = parameters::parameters(context, &patched, place);
             let name = patched.model.effects[place].name;
@@ -133,7 +138,7 @@ fn only_named(scales: &Scales, weighed: &mut WeighedModel) -> Option<Shown> {
             weighed.have_no_size(&gone);
             continue;
         }
-        let shown = Shown::new(context, &holdout.smoothed, &weighed.estimator, refit, patched);
+        let shown = ModelComparison::new(context, &holdout.smoothed, &weighed.estimator, refit, patched);
         if by_shares || named.is_empty() || is_material(&shown.table) {
             return Some(shown);
         }

@@ -1,8 +1,8 @@
 //! The third stage: what the regression names, fitted by the filter. No likelihood rejects it.
 
 use crate::decide::acceptance_criteria::gather_evidence;
-use crate::decide::elimination::{Found, StandingModel};
-use crate::decide::material::{self, Material};
+use crate::decide::elimination::{Found, SurvivingModel};
+use crate::decide::material::{self, SelectedByShare};
 use crate::decide::thresholds::MOST_IN_CLASS;
 use crate::evidence::holdout_set::HoldoutSet;
 use crate::evidence::known_travel::known;
@@ -15,7 +15,7 @@ use crate::fit::noise::Colour;
 use crate::laws::definition::NominalTerm;
 use crate::laws::{Effect, EffectName};
 use crate::propose::context::{FitContext, FittedModel};
-use crate::propose::joint::in_its_own_motion;
+use crate::propose::two_mass::in_its_own_motion;
 use regression::Hypothesis;
 
 /// The recordings with the effects that the regression names; none where it names nothing that the
@@ -30,7 +30,7 @@ pub(crate) fn by_regression(prepared: &Prepared, found: &Found, rounds: &[Vec<Hy
         let dry = EffectName::ALL.iter().find(is_dry);
         model = dry.and_then(|name| with_effect(&context, &model, *name)).unwrap_or(model);
     }
-    let shown = prepared.shown(&found.fit);
+    let shown = prepared.limits(&found.fit);
     let mut materials = Vec::new();
     for mut material in material::named(rounds) {
         // The regression may not tell its name from one that the filter can fit.
@@ -67,7 +67,12 @@ fn class_of(name: EffectName, twins: Vec<EffectName>, near: Vec<EffectName>) -> 
 }
 
 /// The found recordings with another model.
-fn standing(prepared: &Prepared, found: &Found, first: FittedModel, materials: Vec<Material>) -> Found {
+fn standing(
+    prepared: &Prepared,
+    found: &Found,
+    first: FittedModel,
+    materials: Vec<SelectedByShare>,
+) -> Found {
     let context = prepared.context(&prepared.fit);
     let (fit, white) = in_its_own_motion(&prepared.fit, first, &context);
     let own = prepared.context(&fit);
@@ -80,7 +85,7 @@ fn standing(prepared: &Prepared, found: &Found, first: FittedModel, materials: V
         one.off_force = off_force(&own, &model, i, &holdout);
     }
     let rejected = found.standing.rejected.clone();
-    Found { fit, holdout, null, standing: StandingModel { model, effects: evidence, rejected, materials } }
+    Found { fit, holdout, null, standing: SurvivingModel { model, effects: evidence, rejected, materials } }
 }
 
 /// The part that an effect takes off the held-out force error, beside a model without it that is

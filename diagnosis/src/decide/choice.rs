@@ -34,16 +34,16 @@ pub(crate) fn assessed(
 /// the other leaves clearly less of the force error of the fitted recordings, above the noise of
 /// reading whole counts. Held-out recordings choose nothing.
 fn is_taken(by_regression: &Assessment, by_filter: &Assessment) -> bool {
-    let left = |one: &Assessment| {
+    let part_left = |one: &Assessment| {
         let table = one.table();
         let above_noise = |rms: f64| above(rms, one.weighed.floor, 0.0);
         above_noise(table.patched.fit) / above_noise(table.refit.fit).max(1e-300)
     };
     match &by_filter.foreign {
         // Physics without a name that is sure is kept where it leaves as little.
-        Some(foreign) => 1.0 - foreign.share >= left(by_regression),
+        Some(foreign) => 1.0 - foreign.share >= part_left(by_regression),
         None if by_filter.weighed.named().is_empty() => true,
-        None => left(by_filter) >= CLEARLY_LESS.powi(2) * left(by_regression),
+        None => part_left(by_filter) >= CLEARLY_LESS.powi(2) * part_left(by_regression),
     }
 }
 

@@ -18,7 +18,7 @@ pub(crate) type Evidence = BTreeMap<String, f64>;
 
 /// The residual that the search leaves with the effect in the model.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Leftover {
+pub(crate) struct ResidualEvidence {
     /// Root mean square of what hangs together over time and is not explained, over the force's.
     pub(crate) of_force: f64,
     /// Mean square that the patched model leaves over the refit's, both above what counting and a
@@ -29,7 +29,7 @@ pub(crate) struct Leftover {
 }
 
 /// The evidence for an effect.
-pub(crate) fn evidence(found: &EffectEvidence, left: Leftover) -> Evidence {
+pub(crate) fn evidence(found: &EffectEvidence, left: ResidualEvidence) -> Evidence {
     let log = |x: f64, low: f64, high: f64| x.max(low).min(high).ln();
     let least_share = if found.is_certain() { CERTAIN_SHARE } else { COUNTED_SHARE };
     let unexplained = left.unexplained.min(1.0 - found.share).max(0.0);
@@ -62,8 +62,8 @@ pub(crate) fn confidence(evidence: &Evidence) -> f64 {
     (1.0 / (1.0 + (-(BIAS + score)).exp())).clamp(CLAIMED.0, CLAIMED.1)
 }
 
-/// The probability of a name whose simulation follows the motion less well in short windows than
-/// the simulation without it. It may become unsure by that, and is not taken back.
+/// Lowers the confidence of a name whose simulation follows the motion less well in short windows
+/// than the simulation without it, but never below the naming limit.
 pub(crate) fn with_worse_motion(confidence: f64) -> f64 {
     let odds = confidence / (1.0 - confidence) * (-WORSE_MOTION.0).exp();
     (odds / (1.0 + odds)).max(confidence.min(NAMED))
@@ -74,7 +74,7 @@ pub(crate) fn weakness(evidence: &Evidence) -> Weakness {
     match takes(evidence).max_by(|a, b| a.1.total_cmp(&b.1)).map_or("", |(key, _)| key) {
         "least_z" => Weakness::UnsureGain { z: evidence["least_z"].exp() },
         "share" | "share_of_bristles" => Weakness::SmallShare { share: evidence["share"].exp() },
-        _ => Weakness::LeftOver { part: evidence["unexplained"] },
+        _ => Weakness::Unexplained { part: evidence["unexplained"] },
     }
 }
 
@@ -111,7 +111,7 @@ mod tests {
         let small = weakest(&[("share", 0.04_f64.ln())]);
         assert!(matches!(small, Weakness::SmallShare { share } if near(share, 0.04)), "{small:?}");
         let left = weakest(&[("unexplained", 0.6), ("unexplained_of_force", 1.8)]);
-        assert_eq!(left, Weakness::LeftOver { part: 0.6 });
+        assert_eq!(left, Weakness::Unexplained { part: 0.6 });
     }
 
     #[test]
@@ -123,11 +123,11 @@ mod tests {
 
     #[test]
     fn more_left_over_is_less_sure_and_more_explained_is_surer() {
-        let at = |key: &str, value: f64| confidence(&evidence(&[(key, value)]));
-        assert!(at("unexplained_of_force", 2.0) < at("unexplained_of_force", 0.1));
-        assert!(at("share", -0.1) > at("share", -2.5));
-        assert!(at("least_z", 2.0) > at("least_z", 0.7));
-        assert!(at("unexplained", 0.9) < at("unexplained", 0.1));
+        let confidence_at = |key: &str, value: f64| confidence(&evidence(&[(key, value)]));
+        assert!(confidence_at("unexplained_of_force", 2.0) < confidence_at("unexplained_of_force", 0.1));
+        assert!(confidence_at("share", -0.1) > confidence_at("share", -2.5));
+        assert!(confidence_at("least_z", 2.0) > confidence_at("least_z", 0.7));
+        assert!(confidence_at("unexplained", 0.9) < confidence_at("unexplained", 0.1));
     }
 
     #[test]

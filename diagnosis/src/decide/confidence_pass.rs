@@ -2,9 +2,9 @@
 //! weighed again: a false effect takes evidence from a true one.
 
 use crate::decide::acceptance_criteria::gather_evidence;
-use crate::decide::confidence::{self, Leftover};
-use crate::decide::elimination::{StandingModel, eliminate};
-use crate::decide::material::Material;
+use crate::decide::confidence::{self, ResidualEvidence};
+use crate::decide::elimination::{SurvivingModel, eliminate};
+use crate::decide::material::SelectedByShare;
 use crate::decide::out_of_library;
 use crate::decide::rivals;
 use crate::decide::thresholds::{
@@ -12,7 +12,7 @@ use crate::decide::thresholds::{
     UNDECIDED, UNDERSTOOD,
 };
 use crate::decide::weighed_model::{WeighedEffect, WeighedModel};
-use crate::evidence::comparison::Shown;
+use crate::evidence::comparison::ModelComparison;
 use crate::evidence::effect_evidence::EffectEvidence;
 use crate::evidence::holdout_set::HoldoutSet;
 use crate::evidence::parameters;
@@ -31,7 +31,7 @@ const LEAST_ABOVE: f64 = 0.02;
 
 /// Confidence of an effect in a model with an unsure one: if it does not survive without the unsure
 /// one, its confidence is capped at that one's.
-fn resting(own: f64, unsure: f64, name: EffectName, standing: &[EffectName]) -> f64 {
+fn cap_by_unsure(own: f64, unsure: f64, name: EffectName, standing: &[EffectName]) -> f64 {
     if standing.contains(&name) { own } else { own.min(unsure) }
 }
 
@@ -44,12 +44,12 @@ fn creeps(effect: &Effect, span: &Span) -> Option<f64> {
 
 /// Weighs what the search found, and again without what is unsure as long as that makes the rest
 /// surer.
-pub(crate) fn weigh(scales: &Scales, found: StandingModel) -> WeighedModel {
-    scales.without_unsure(scales.once(found))
+pub(crate) fn weigh(weighing: &WeighingContext, found: SurvivingModel) -> WeighedModel {
+    weighing.without_unsure(weighing.weigh_model(found))
 }
 
 /// The context in which every model is weighed.
-pub(crate) struct Scales<'a> {
+pub(crate) struct WeighingContext<'a> {
     pub(crate) context: &'a FitContext<'a>,
     /// The null under white noise.
     pub(crate) refit: &'a FittedModel,
@@ -59,17 +59,17 @@ pub(crate) struct Scales<'a> {
     pub(crate) excitation: &'a Excitation,
 }
 
-impl Scales<'_> {
+impl WeighingContext<'_> {
     /// The best model, weighed without effect `i`.
     fn without(&self, best: &WeighedModel, i: usize) -> WeighedModel {
-        let mut less = best.slow.model.clone();
+        let mut less = best.coloured_fit.model.clone();
         less.effects.remove(i);
-        let model = self.context.fit_slow(less, &[&self.null.noise, &best.slow.noise]);
+        let model = self.context.fit_coloured(less, &[&self.null.noise, &best.coloured_fit.noise]);
         let noise = &best.shown.patched.noise;
         let mut standing =
             eliminate(model, self.context, self.holdout, &self.null.noise, noise, &best.materials);
         standing.rejected.splice(..0, best.rejected.iter().cloned());
-        self.once(standing)
+        self.weigh_model(standing)
     }
 
     fn without_unsure(&self, mut best: WeighedModel) -> WeighedModel {
@@ -89,21 +89,21 @@ impl Scales<'_> {
             let standing: Vec<EffectName> = next.effects.iter().map(|e| e.found.effect.name).collect();
             let unsure = best.effects[i].confidence;
             for one in &mut best.effects {
-                one.confidence = resting(one.confidence, unsure, one.found.effect.name, &standing);
+                one.confidence = cap_by_unsure(one.confidence, unsure, one.found.effect.name, &standing);
             }
             return best;
         }
     }
 
     /// Weighs a model.
-    fn once(&self, standing: StandingModel) -> WeighedModel {
+    fn weigh_model(&self, standing: SurvivingModel) -> WeighedModel {
         let Self { context, refit, holdout, .. } = *self;
-        let (StandingModel { model: slow, effects: found, rejected, materials }, patched) =
+        let (SurvivingModel { model: coloured_fit, effects: found, rejected, materials }, patched) =
             self.against_rivals(standing);
         let estimator = Estimator::new(context.tracks, &patched.noise, context.scale);
-        let shown = Shown::new(context, &holdout.smoothed, &estimator, refit, patched);
-        let left = self.left_over(&slow, &shown, &estimator);
-        let Shown { on_fit, on_holdout, .. } = &shown;
+        let shown = ModelComparison::new(context, &holdout.smoothed, &estimator, refit, patched);
+        let left = self.left_over(&coloured_fit, &shown, &estimator);
+        let ModelComparison { on_fit, on_holdout, .. } = &shown;
         let hertz = tonal::frequency(&estimator, &left_by(context.tracks, on_fit));
         let swing =
             hertz.and_then(|hertz| tonal::swing(&estimator, hertz, &left_by(&holdout.smoothed, on_holdout)));
@@ -111,7 +111,7 @@ impl Scales<'_> {
         let effects = found.into_iter().enumerate();
         let effects = effects
             .map(|(i, found)| {
-                let material = Material::find(&materials, found.effect.name).cloned();
+                let material = SelectedByShare::find(&materials, found.effect.name).cloned();
                 self.weigh_effect(found, material, i, &shown.patched, &left)
             })
             .collect();
@@ -120,7 +120,7 @@ impl Scales<'_> {
             dropped: Vec::new(),
             floor: left.floor,
             understood: left.understood,
-            slow,
+            coloured_fit,
             rejected,
             materials,
             shown,
@@ -133,12 +133,12 @@ impl Scales<'_> {
     /// A model whose effects have met their rivals, and its fit under white noise. A rival that
     /// leads takes the effect's place, once: the search adds one effect after another, and what was
     /// best then need not be best in the end.
-    fn against_rivals(&self, mut standing: StandingModel) -> (StandingModel, FittedModel) {
-        let contest = |standing: &mut StandingModel, patched: &FittedModel| {
-            let StandingModel { model, effects, .. } = standing;
+    fn against_rivals(&self, mut standing: SurvivingModel) -> (SurvivingModel, FittedModel) {
+        let contest = |standing: &mut SurvivingModel, patched: &FittedModel| {
+            let SurvivingModel { model, effects, .. } = standing;
             rivals::fit_rivals(self.context, patched, model, self.holdout, effects);
         };
-        let StandingModel { model: last, materials, .. } = &standing;
+        let SurvivingModel { model: last, materials, .. } = &standing;
         let patched = self.context.fit_shown(last.model.clone(), &last.noise, !materials.is_empty());
         contest(&mut standing, &patched);
         let leader = rivals::leader(&standing.effects, &standing.materials);
@@ -155,38 +155,44 @@ impl Scales<'_> {
     /// the rival may not be named.
     fn replaced(
         &self,
-        standing: &StandingModel,
+        standing: &SurvivingModel,
         i: usize,
         rival: Effect,
-    ) -> Option<(StandingModel, FittedModel)> {
+    ) -> Option<(SurvivingModel, FittedModel)> {
         let Self { context, holdout, .. } = *self;
-        let StandingModel { model, rejected, materials, .. } = standing;
+        let SurvivingModel { model, rejected, materials, .. } = standing;
         let mut with = model.model.clone();
         with.effects[i] = rival;
-        let slow = context.fit_slow(with, &[&self.null.noise, &model.noise]);
-        let white = context.fit_shown(slow.model.clone(), &slow.noise, !materials.is_empty());
-        let effects = gather_evidence(context, &white, &slow.noise, holdout);
-        let may_stand =
-            effects.iter().all(|one| one.rejection().is_none()) && !parameters::is_absent(context, &white, i);
+        let coloured_fit = context.fit_coloured(with, &[&self.null.noise, &model.noise]);
+        let white_fit =
+            context.fit_shown(coloured_fit.model.clone(), &coloured_fit.noise, !materials.is_empty());
+        let effects = gather_evidence(context, &white_fit, &coloured_fit.noise, holdout);
+        let may_stand = effects.iter().all(|one| one.rejection().is_none())
+            && !parameters::is_absent(context, &white_fit, i);
         let (rejected, materials) = (rejected.clone(), materials.clone());
-        may_stand.then_some((StandingModel { model: slow, effects, rejected, materials }, white))
+        may_stand.then_some((SurvivingModel { model: coloured_fit, effects, rejected, materials }, white_fit))
     }
 
     /// The force that a model leaves.
-    fn left_over(&self, slow: &FittedModel, shown: &Shown, estimator: &Estimator) -> LeftOver {
+    fn left_over(
+        &self,
+        coloured_fit: &FittedModel,
+        shown: &ModelComparison,
+        estimator: &Estimator,
+    ) -> ResidualSummary {
         let Self { context, holdout, .. } = *self;
-        let Shown { patched, on_holdout, table, .. } = shown;
+        let ModelComparison { patched, on_holdout, table, .. } = shown;
         let known: &[BlockedRecording] = &holdout.shown(&patched.model, context.span);
         let (inertia, _, _) = parameters::scale(context.nominal, patched);
         let count = 1.0 / context.nominal.rig.encoder.counts_per_unit;
         let floor = estimator.counting(context.tracks, &patched.noise, count) * inertia;
         let (refit_holdout, left_holdout) =
             (estimator.rms(&on_holdout.refit, known), estimator.rms(&on_holdout.patched, known));
-        let left = slow.noise.slow * inertia * inertia;
+        let left = coloured_fit.noise.slow * inertia * inertia;
         // What neither counting nor a white disturbance makes.
-        let random = floor.hypot(estimator.white(&slow.noise) * inertia);
+        let random = floor.hypot(estimator.white(&coloured_fit.noise) * inertia);
         let of_chance = |residual: f64| above(residual, random, LEAST_ABOVE).max(1e-300);
-        let evidence = Leftover {
+        let evidence = ResidualEvidence {
             of_force: left.sqrt() / table.force_rms.fit.max(1e-300),
             unexplained: [(left_holdout, refit_holdout), (table.patched.fit, table.refit.fit)]
                 .map(|(left, refit)| of_chance(left) / of_chance(refit))
@@ -199,11 +205,11 @@ impl Scales<'_> {
         let leaves_much = table.patched.fit.powi(2) > LEAVES_MUCH * table.refit.fit.powi(2);
         let left = left_holdout.min(table.patched.fit);
         let is_other_physics = left >= LIMITED_BY_PHYSICS * floor;
-        LeftOver { floor, evidence, understood, leaves_much, is_other_physics }
+        ResidualSummary { floor, evidence, understood, leaves_much, is_other_physics }
     }
 
     /// Correlation of the residual between repeats of a motion in all recordings.
-    fn repeats(&self, shown: &Shown, estimator: &Estimator) -> Option<f64> {
+    fn repeats(&self, shown: &ModelComparison, estimator: &Estimator) -> Option<f64> {
         let all: Vec<BlockedRecording> =
             self.context.tracks.iter().chain(&self.holdout.smoothed).cloned().collect();
         let left: Vec<Vec<f64>> =
@@ -216,10 +222,10 @@ impl Scales<'_> {
     fn weigh_effect(
         &self,
         found: EffectEvidence,
-        material: Option<Material>,
+        material: Option<SelectedByShare>,
         i: usize,
         patched: &FittedModel,
-        left: &LeftOver,
+        left: &ResidualSummary,
     ) -> WeighedEffect {
         let context = self.context;
         let parameters = parameters::parameters(context, patched, i);
@@ -264,10 +270,10 @@ impl Scales<'_> {
 }
 
 /// The force that a model leaves.
-struct LeftOver {
+struct ResidualSummary {
     /// Residual that reading whole counts alone causes, N·m or N.
     floor: f64,
-    evidence: Leftover,
+    evidence: ResidualEvidence,
     /// True if the model leaves little enough of the force to have understood it.
     understood: bool,
     /// True if the model leaves much of what the refit left.
@@ -276,8 +282,8 @@ struct LeftOver {
     is_other_physics: bool,
 }
 
-fn left_by<'a>(tracks: &'a [BlockedRecording], residuals: &'a Residuals) -> tonal::Left<'a> {
-    tonal::Left { tracks, force: &residuals.force, refit: &residuals.refit }
+fn left_by<'a>(tracks: &'a [BlockedRecording], residuals: &'a Residuals) -> tonal::ResidualView<'a> {
+    tonal::ResidualView { tracks, force: &residuals.force, refit: &residuals.refit }
 }
 
 #[cfg(test)]
@@ -287,8 +293,8 @@ mod tests {
     #[test]
     fn an_effect_that_needs_another_is_no_surer_than_it() {
         let drift = EffectName::FrictionDrift;
-        assert_eq!(resting(0.92, 0.65, drift, &[]), 0.65);
-        assert_eq!(resting(0.92, 0.65, drift, &[drift]), 0.92);
-        assert_eq!(resting(0.5, 0.65, drift, &[]), 0.5);
+        assert_eq!(cap_by_unsure(0.92, 0.65, drift, &[]), 0.65);
+        assert_eq!(cap_by_unsure(0.92, 0.65, drift, &[drift]), 0.92);
+        assert_eq!(cap_by_unsure(0.5, 0.65, drift, &[]), 0.5);
     }
 }

@@ -100,12 +100,12 @@ impl Field<'_> {
     fn screened(&self) -> Vec<Contender> {
         let refit = &self.assessment.refit;
         let best = self.context.screen(refit, &|_| true).into_iter().take(SCREENED_COUNT);
-        let one = |(effect, _): (Effect, f64)| Contender {
+        let contender = |(effect, _): (Effect, f64)| Contender {
             name: Some(effect.name),
             probability: SCREENED,
             rig: self.rig(self.fitted(with(&Model::default(), effect))),
         };
-        let mut out: Vec<Contender> = best.map(one).collect();
+        let mut out: Vec<Contender> = best.map(contender).collect();
         let rest = 1.0 - SCREENED * out.len() as f64;
         let rig = self.rig(self.fitted(Model::default()));
         out.push(Contender { name: None, probability: rest, rig });

@@ -19,7 +19,7 @@ use crate::decide::rejection::Rejection;
 use crate::decide::verdict::verdict;
 use crate::decide::weighed_model::{WeighedEffect, WeighedModel};
 use crate::evidence::beside_rivals;
-use crate::evidence::comparison::Shown;
+use crate::evidence::comparison::ModelComparison;
 use crate::evidence::known_travel;
 use crate::evidence::law_band::Band;
 use crate::evidence::parameters;
@@ -31,7 +31,7 @@ use crate::fit::blocked_recording::BlockedRecording;
 use crate::fit::filter::Noise;
 use crate::fit::force_residual::Estimator;
 use crate::fit::noise::Colour;
-use crate::fit::nominal::{Kept, Key, Nominal};
+use crate::fit::nominal::{InertiaSource, Key, Nominal};
 use crate::fit::skew;
 use crate::laws::EffectName;
 use crate::propose::context::FittedModel;
@@ -50,7 +50,7 @@ pub(crate) fn decide(
     let decision = Decision { prepared, assessment, rounds };
     let maps_with_all = decision.maps(&assessment.weighed.shown);
     let (verdict, reason) = decision.verdict(&maps_with_all);
-    // The verdict rests on all that was weighed, what people see on what is named.
+    // The verdict uses every weighed effect; plots use named ones.
     let with_named = assessment.named_alone.as_ref();
     let named_alone = with_named.unwrap_or(&assessment.weighed.shown);
     let unnamed = assessment.unnamed.as_ref().filter(|_| verdict == Verdict::Unexplained);
@@ -108,7 +108,7 @@ fn moved(nominal: &Nominal, tracks: &[BlockedRecording], shown: &FittedModel) ->
         inertia_by_gain: by_gain,
         deviations: if is_known { by_gain.ln() / nominal.gain_sd() } else { 0.0 },
         is_at_limit: is_known && nominal.is_at_limit(ratio),
-        is_hidden: nominal.kept_inertia == Some(Kept::OfRig),
+        is_hidden: nominal.kept_inertia == Some(InertiaSource::OfRig),
         scatter: nominal.rig.encoder.noise_counts.is_none().then(|| scatter(nominal, tracks, noise)),
     }
 }
@@ -133,7 +133,7 @@ struct Decision<'a> {
 
 impl Decision<'_> {
     /// Residuals of a model over states.
-    fn maps(&self, shown: &Shown) -> Vec<Map> {
+    fn maps(&self, shown: &ModelComparison) -> Vec<Map> {
         let Assessment { fit, holdout, .. } = self.assessment;
         let (on_fit, on_holdout) = (&shown.on_fit.patched, &shown.on_holdout.patched);
         let turn = self.prepared.nominal.rig.turn();
@@ -145,13 +145,13 @@ impl Decision<'_> {
     fn verdict(&self, maps: &[Map]) -> (Verdict, Option<Reason>) {
         let Assessment { weighed, holdout, excitation, unnamed, foreign, .. } = self.assessment;
         let form = unnamed.is_some().then_some(Reason::FreeForm);
-        let foreign = foreign.clone().map(Reason::Foreign).or(form);
+        let foreign = foreign.clone().map(Reason::UnnamedPhysics).or(form);
         let follows =
             || material::follows(self.rounds).map(|(effect, share)| Reason::Follows { effect, share });
         verdict(weighed, maps, &holdout.smoothed, excitation, foreign, &follows)
     }
 
-    fn rigs(&self, shown: &Shown) -> Rigs {
+    fn rigs(&self, shown: &ModelComparison) -> Rigs {
         let Prepared { given, nominal, .. } = self.prepared;
         let Assessment { fit, refit, .. } = self.assessment;
         let rig_of = |model: &FittedModel| -> Rig {
@@ -165,14 +165,14 @@ impl Decision<'_> {
     }
 
     /// The picture of the first named effect, with the nearest rival fitted instead.
-    fn decisive(&self, named: &[NamedEffect], shown: &Shown) -> Option<Decisive> {
+    fn decisive(&self, named: &[NamedEffect], shown: &ModelComparison) -> Option<Decisive> {
         let Assessment { fit, refit, weighed, holdout, .. } = self.assessment;
         let name = named.first()?.name;
         let effect = shown.patched.model.effects.iter().find(|effect| effect.name == name)?;
         let (context, smoothed) = (self.prepared.context(fit), &holdout.smoothed);
         let fitted = |model| {
             let model = context.fit(model, &shown.patched.noise, Colour::White);
-            Shown::new(&context, smoothed, &weighed.estimator, refit, model)
+            ModelComparison::new(&context, smoothed, &weighed.estimator, refit, model)
         };
         let (estimator, holdout) = (&weighed.estimator, smoothed.as_slice());
         let rival = decisive::nearest_rival(name, weighed, shown, fitted);
@@ -182,11 +182,11 @@ impl Decision<'_> {
     }
 
     /// The named effects, the one that explains most first.
-    fn named_effects(&self, with_named: Option<&Shown>, follows_worse: bool) -> Vec<NamedEffect> {
+    fn named_effects(&self, with_named: Option<&ModelComparison>, follows_worse: bool) -> Vec<NamedEffect> {
         let Assessment { fit, weighed, .. } = self.assessment;
         let nominal = &self.prepared.nominal;
         let (context, patched) = (self.prepared.context(fit), &with_named.unwrap_or(&weighed.shown).patched);
-        let one = |(i, effect): (usize, &WeighedEffect)| NamedEffect {
+        let named_effect = |(i, effect): (usize, &WeighedEffect)| NamedEffect {
             name: effect.found.effect.name,
             class: effect.class.clone(),
             confidence: match follows_worse {
@@ -207,7 +207,7 @@ impl Decision<'_> {
         };
         let named = weighed.named().into_iter().map(|i| &weighed.effects[i]).enumerate();
         let mut effects: Vec<(f64, NamedEffect)> =
-            named.map(|(i, effect)| (effect.found.holdout.sum, one((i, effect)))).collect();
+            named.map(|(i, effect)| (effect.found.holdout.sum, named_effect((i, effect)))).collect();
         effects.sort_by(|a, b| b.0.total_cmp(&a.0));
         effects.into_iter().map(|(_, named)| named).collect()
     }
@@ -232,7 +232,7 @@ fn free_form(unnamed: Option<&Unnamed>, beside: Option<&FreeFormShare>) -> Optio
 }
 
 /// Part of the held-out mean square above the noise that the patched model leaves.
-fn unexplained_fraction(shown: &Shown, floor: f64) -> f64 {
+fn unexplained_fraction(shown: &ModelComparison, floor: f64) -> f64 {
     let table = &shown.table;
     let before = above(table.nominal.holdout, floor, 0.0).max(above(table.refit.holdout, floor, 0.0));
     let left = above(table.patched.holdout, floor, 0.0);
@@ -318,9 +318,9 @@ fn all_series(
     of: &Residuals,
     holdout: bool,
 ) -> Vec<Series> {
-    let one = |(r, track): (usize, &BlockedRecording)| {
+    let series = |(r, track): (usize, &BlockedRecording)| {
         let moving = estimator.moving(track);
         Series::new(track, holdout, &moving, &of.nominal[r], &of.refit[r], &of.patched[r], &of.force[r])
     };
-    tracks.iter().enumerate().map(one).collect()
+    tracks.iter().enumerate().map(series).collect()
 }

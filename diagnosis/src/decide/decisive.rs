@@ -2,7 +2,7 @@
 //! that the named law acts on, and what the law takes of it.
 
 use crate::decide::weighed_model::WeighedModel;
-use crate::evidence::comparison::Shown;
+use crate::evidence::comparison::ModelComparison;
 use crate::evidence::effect_evidence::Rival;
 use crate::evidence::law_band::{Band, Reach};
 use crate::evidence::residual_maps::variable as variable_of;
@@ -85,9 +85,9 @@ struct Row {
 pub(crate) fn nearest_rival<'a>(
     name: EffectName,
     weighed: &'a WeighedModel,
-    shown: &Shown,
-    fitted: impl Fn(Model) -> Shown,
-) -> Option<(&'a Rival, Shown)> {
+    shown: &ModelComparison,
+    fitted: impl Fn(Model) -> ModelComparison,
+) -> Option<(&'a Rival, ModelComparison)> {
     let found = &weighed.effects.iter().find(|one| one.found.effect.name == name)?.found;
     let mut model = shown.patched.model.clone();
     let is_new = |rival: &&Rival| model.effects.iter().all(|effect| effect.name != rival.name);
@@ -98,10 +98,10 @@ pub(crate) fn nearest_rival<'a>(
 
 /// The residuals that a picture is made of.
 pub(crate) struct Residual<'a> {
-    pub(crate) shown: &'a Shown,
+    pub(crate) shown: &'a ModelComparison,
     /// On the fitted recordings.
     pub(crate) band: Band,
-    pub(crate) rival: Option<(&'a Rival, Shown)>,
+    pub(crate) rival: Option<(&'a Rival, ModelComparison)>,
     pub(crate) fit: &'a [BlockedRecording],
     pub(crate) holdout: &'a [BlockedRecording],
     pub(crate) estimator: &'a Estimator,
@@ -121,7 +121,9 @@ impl Residual<'_> {
         let (tracks, of) =
             if held_out { (self.holdout, &self.shown.on_holdout) } else { (self.fit, &self.shown.on_fit) };
         let rival = self.rival.as_ref().filter(|_| !held_out).map(|(_, shown)| &shown.on_fit);
-        let one = |(r, track): (usize, &BlockedRecording)| -> Vec<Row> {
+        let band = (!held_out).then_some(&self.band);
+        let mut rows = Vec::new();
+        for (r, track) in tracks.iter().enumerate() {
             let moving = self.estimator.moving(track);
             let at = variable_of(track, state.variable, state.period);
             let way = |j: usize| if state.along_motion { track.motion.v[j].signum() } else { 1.0 };
@@ -132,32 +134,38 @@ impl Residual<'_> {
                 state: at[j],
                 left: way(j) * of.refit[r][j],
                 law: taken(of, j),
-                reach: if held_out { [0.0; 2] } else { reach(self.band.reach(r, j, taken(of, j)), j) },
+                reach: band.map_or([0.0; 2], |band| reach(band.reach(r, j, taken(of, j)), j)),
                 rival: rival.map_or(0.0, |rival| taken(rival, j)),
             };
-            let rows: Vec<Row> = (0..at.len()).filter(|j| moving[*j]).map(row).collect();
-            state.period.map_or_else(|| rows.clone(), |period| in_phase(&rows, period))
-        };
-        tracks.iter().enumerate().flat_map(one).collect()
+            let of_recording: Vec<Row> = (0..at.len()).filter(|j| moving[*j]).map(row).collect();
+            match state.period {
+                Some(period) => rows.extend(in_phase(&of_recording, period)),
+                None => rows.extend(of_recording),
+            }
+        }
+        rows
     }
 
     /// The period of the wave that takes most, rad or m; none where the law has no waves.
     fn period(&self, effect: &Effect) -> Option<f64> {
-        let of = &self.shown.on_fit;
-        let power = |wave: f64| -> f64 {
-            let one = |(r, track): (usize, &BlockedRecording)| {
-                let law = of.refit[r].iter().zip(&of.patched[r]).map(|(refit, patched)| refit - patched);
-                let sum = law.zip(track.places()).fold((0.0, 0.0), |(a, b): (f64, f64), (law, x)| {
-                    let (sin, cos) = (wave * x).sin_cos();
-                    (a + law * cos, b + law * sin)
-                });
-                sum.0.hypot(sum.1)
-            };
-            self.fit.iter().enumerate().map(one).sum()
-        };
         let waves = effect.waves().into_iter().map(|(_, wave)| wave).filter(|wave| *wave != 0.0);
-        let largest = waves.max_by(|a, b| power(*a).total_cmp(&power(*b)))?;
+        let largest = waves.max_by(|a, b| self.amplitude(*a).total_cmp(&self.amplitude(*b)))?;
         Some(std::f64::consts::TAU / largest.abs())
+    }
+
+    /// The amplitudes of a wave, rad per unit of travel, in what the laws take, summed over
+    /// recordings; to compare waves.
+    fn amplitude(&self, wave: f64) -> f64 {
+        let of = &self.shown.on_fit;
+        let amplitude = |(r, track): (usize, &BlockedRecording)| {
+            let law = of.refit[r].iter().zip(&of.patched[r]).map(|(refit, patched)| refit - patched);
+            let sum = law.zip(track.places()).fold((0.0, 0.0), |(a, b): (f64, f64), (law, x)| {
+                let (sin, cos) = (wave * x).sin_cos();
+                (a + law * cos, b + law * sin)
+            });
+            sum.0.hypot(sum.1)
+        };
+        self.fit.iter().enumerate().map(amplitude).sum()
     }
 
     /// The picture for an effect; none where too little moves, or where the state says little of
@@ -204,7 +212,10 @@ impl Residual<'_> {
         let unsaid = |row: &Row| row.law - law[place(row)].unwrap_or(0.0);
         let square = |of: &dyn Fn(&Row) -> f64| fitted.iter().map(|row| of(row).powi(2)).sum::<f64>();
         let unsaid = square(&unsaid) / square(&|row| row.law).max(1e-300);
-        let plot = || Decisive {
+        if unsaid >= 1.0 - SEEN {
+            return None;
+        }
+        let picture = Decisive {
             name,
             variable: state.variable,
             period: state.period,
@@ -216,7 +227,7 @@ impl Residual<'_> {
             fitted: bins(&fitted, |row| row.left),
             held_out: bins(&held_out, |row| row.left),
         };
-        (unsaid < 1.0 - SEEN).then(|| (plot(), unsaid))
+        Some((picture, unsaid))
     }
 }
 

@@ -5,8 +5,8 @@ use crate::data::schema::{FitTable, Parameter, Place, Simulation, Verdict};
 use crate::decide::confidence::Evidence;
 use crate::decide::decisive::Decisive;
 use crate::decide::evidence_table::EvidenceRow;
-use crate::decide::out_of_library::Foreign;
-use crate::decide::rejection::{Rather, Rejection};
+use crate::decide::out_of_library::UnnamedPhysics;
+use crate::decide::rejection::{BetterExplanation, Rejection};
 use crate::evidence::known_travel::BeyondFitted;
 use crate::evidence::residual_maps::Map;
 use crate::fit::blocked_recording::BlockedRecording;
@@ -47,9 +47,9 @@ pub(crate) enum Reason {
     /// A force that swings at a frequency of its own is this part of what a refit leaves.
     Swing { part: f64, hertz: f64 },
     /// The residual resembles an effect, but something without a name explains more.
-    Resembles { effect: EffectName, rather: Rather },
+    Resembles { effect: EffectName, rather: BetterExplanation },
     /// Physics without a name explains most of it.
-    Foreign(Foreign),
+    UnnamedPhysics(UnnamedPhysics),
     /// A force of any form explains it.
     FreeForm,
     /// The regression finds an effect that takes this part of the force error, too little for a

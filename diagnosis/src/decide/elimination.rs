@@ -1,7 +1,7 @@
 //! Removes the effects that do not generalise when all are judged together.
 
 use crate::decide::acceptance_criteria::gather_evidence;
-use crate::decide::material::Material;
+use crate::decide::material::SelectedByShare;
 use crate::decide::rejection::Rejection;
 use crate::evidence::effect_evidence::EffectEvidence;
 use crate::evidence::holdout_set::HoldoutSet;
@@ -22,7 +22,7 @@ pub(crate) struct RejectedHypothesis {
 }
 
 /// A model all of whose effects carry to the held-out recordings.
-pub(crate) struct StandingModel {
+pub(crate) struct SurvivingModel {
     /// Under coloured noise.
     pub(crate) model: FittedModel,
     /// The evidence for each effect.
@@ -30,7 +30,7 @@ pub(crate) struct StandingModel {
     /// The effects that were removed.
     pub(crate) rejected: Vec<RejectedHypothesis>,
     /// The effects that shares of the force error name.
-    pub(crate) materials: Vec<Material>,
+    pub(crate) materials: Vec<SelectedByShare>,
 }
 
 /// The model of a proposer, each of whose effects stands, with the recordings in its motion.
@@ -41,7 +41,7 @@ pub(crate) struct Found {
     pub(crate) holdout: HoldoutSet,
     /// The null under coloured noise.
     pub(crate) null: FittedModel,
-    pub(crate) standing: StandingModel,
+    pub(crate) standing: SurvivingModel,
 }
 
 /// Takes out whatever does not carry to the held-out recordings, the weakest first, until all that
@@ -53,8 +53,8 @@ pub(crate) fn eliminate(
     holdout: &HoldoutSet,
     null_noise: &Noise,
     noise: &Noise,
-    materials: &[Material],
-) -> StandingModel {
+    materials: &[SelectedByShare],
+) -> SurvivingModel {
     let mut rejected = Vec::new();
     loop {
         let plain = context.fit(model.model.clone(), noise, Colour::White);
@@ -65,19 +65,19 @@ pub(crate) fn eliminate(
             .filter_map(|(i, f)| {
                 // Where other physics limits, nothing explains everything: no likelihood rejects
                 // what shares name.
-                let judged = Material::find(materials, f.effect.name).is_none().then_some(f)?;
+                let judged = SelectedByShare::find(materials, f.effect.name).is_none().then_some(f)?;
                 let is_absent = || parameters::is_absent(context, &plain, i);
                 let why = judged.rejection().or_else(|| is_absent().then_some(Rejection::NoSize))?;
                 Some((i, f.holdout.z, why))
             })
             .min_by(|a, b| a.1.total_cmp(&b.1));
         let Some((i, _, why)) = weakest else {
-            return StandingModel { model, effects, rejected, materials: materials.to_vec() };
+            return SurvivingModel { model, effects, rejected, materials: materials.to_vec() };
         };
         let (name, gain) = (effects[i].effect.name, effects[i].holdout.sum);
         rejected.push(RejectedHypothesis { name, holdout_gain: Some(gain), why });
         let mut less = model.model.clone();
         less.effects.remove(i);
-        model = context.fit_slow(less, &[null_noise, noise]);
+        model = context.fit_coloured(less, &[null_noise, noise]);
     }
 }

@@ -63,9 +63,10 @@ mod tests {
         let text = csv(&[EvidenceRow { name: "backlash", is_named: true, numbers }]);
         let lines: Vec<Vec<&str>> = text.lines().map(|line| line.split(',').collect()).collect();
         assert_eq!(lines[0].len(), lines[1].len());
-        let at = |column: &str| lines[1][lines[0].iter().position(|name| *name == column).expect("a column")];
-        assert_eq!((at("hypothesis"), at("named"), at("share")), ("backlash", "1", ""));
-        let number = |column: &str| at(column).parse::<f64>().expect("a number");
+        let cell =
+            |column: &str| lines[1][lines[0].iter().position(|name| *name == column).expect("a column")];
+        assert_eq!((cell("hypothesis"), cell("named"), cell("share")), ("backlash", "1", ""));
+        let number = |column: &str| cell(column).parse::<f64>().expect("a number");
         assert_eq!((number("filter_gain"), number("motion_0_5_s")), (3.5, -0.25));
     }
 }

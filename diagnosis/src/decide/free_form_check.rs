@@ -1,8 +1,8 @@
 //! The check of every name against forces of any form, which represent physics outside the library.
 
 use crate::decide::acceptance_criteria::gather_evidence;
-use crate::decide::against_forms::is_told;
-use crate::decide::rejection::Rather;
+use crate::decide::against_forms::is_reportable;
+use crate::decide::rejection::BetterExplanation;
 use crate::decide::thresholds::FORM_OF_CONSTANT;
 use crate::decide::weighed_model::WeighedModel;
 use crate::evidence::holdout_set::HoldoutSet;
@@ -37,7 +37,8 @@ pub(crate) fn check(
     if named.is_empty() {
         return (weighed, None);
     }
-    let evaluator = Evaluator::new(context.nominal, context.tracks, &weighed.slow.noise, context.scale);
+    let evaluator =
+        Evaluator::new(context.nominal, context.tracks, &weighed.coloured_fit.noise, context.scale);
     let model = weighed.shown.patched.model.clone();
     let whole = evaluator.densities(&model);
     for i in named {
@@ -52,7 +53,8 @@ pub(crate) fn check(
         let least = enough * weighed.effects[i].found.holdout.sum;
         if let Some(against) = standing.against.filter(|against| against.most > least) {
             let (over, form) = (against.inputs, against.most);
-            weighed.effects[i].rather = Some(Rather::FreeForm { over, form, effect: standing.own.sum });
+            weighed.effects[i].rather =
+                Some(BetterExplanation::FreeForm { over, form, effect: standing.own.sum });
         }
     }
     let taken = whole.taken().into_iter().next().filter(|_| !weighed.named().is_empty());
@@ -82,7 +84,7 @@ pub(crate) fn alone(
 ) -> Option<(Unnamed, Option<FittedModel>)> {
     let evaluator = Evaluator::new(context.nominal, context.tracks, noise, context.scale);
     let all = evaluator.densities(&Model::default()).taken();
-    let taken = all.into_iter().find(|taken| is_told(taken, context.tracks))?;
+    let taken = all.into_iter().find(|taken| is_reportable(taken, context.tracks))?;
     let (inertia, _, _) = parameters::scale(context.nominal, refit);
     let shape = evaluator.shape(&Model::default(), taken.inputs, inertia)?;
     let over_angle = shape.table.over.contains(&Variable::Angle);

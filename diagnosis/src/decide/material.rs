@@ -5,13 +5,13 @@ use crate::decide::thresholds::{
     TAKEN_Z, UNLIKELY_Z,
 };
 use crate::laws::EffectName;
-use crate::propose::context::MOST;
+use crate::propose::context::MOST_EFFECTS;
 use regression::{HeldOut, Hypothesis};
 
 /// An effect that takes a material part of the force error, on fitted and on held-out recordings,
 /// ahead of its rivals.
 #[derive(Clone, Debug)]
-pub(crate) struct Material {
+pub(crate) struct SelectedByShare {
     pub(crate) name: EffectName,
     /// Part of the force error that it takes on both.
     pub(crate) share: f64,
@@ -19,7 +19,7 @@ pub(crate) struct Material {
     pub(crate) class: Vec<EffectName>,
 }
 
-impl Material {
+impl SelectedByShare {
     /// Probability that the name or its class is right.
     pub(crate) fn confidence(&self) -> f64 {
         let score = SHARE_ODDS.0 + SHARE_ODDS.1 * self.share;
@@ -34,8 +34,8 @@ impl Material {
 
 /// The effects that a regression's rounds name, the first first. A round whose first law is refused
 /// stops nothing: the order is of the fitted recordings, and the held-out ones only refuse.
-pub(crate) fn named(rounds: &[Vec<Hypothesis>]) -> Vec<Material> {
-    rounds.iter().filter_map(|round| material(round)).take(MOST).collect()
+pub(crate) fn named(rounds: &[Vec<Hypothesis>]) -> Vec<SelectedByShare> {
+    rounds.iter().filter_map(|round| material(round)).take(MOST_EFFECTS).collect()
 }
 
 /// The effect that takes most of the force error where none is named, and its share; none where the
@@ -50,7 +50,7 @@ pub(crate) fn follows(rounds: &[Vec<Hypothesis>]) -> Option<(EffectName, f64)> {
 
 /// The first law of a round with those that the recordings hardly tell from it; none where it may
 /// not be named.
-fn material(round: &[Hypothesis]) -> Option<Material> {
+fn material(round: &[Hypothesis]) -> Option<SelectedByShare> {
     let (first, others) = round.split_first()?;
     let (e, HeldOut { share, z, size_agreement }) = (&first.evidence, first.evidence.held_out?);
     let least = share.min(e.share);
@@ -64,7 +64,7 @@ fn material(round: &[Hypothesis]) -> Option<Material> {
     let near = others.iter().filter(is_near).take(MOST_IN_CLASS - 1);
     let class = [first].into_iter().chain(near).filter_map(|one| EffectName::find(one.law.key)).collect();
     let name = EffectName::find(first.law.key)?;
-    is_named.then_some(Material { name, share: least, class })
+    is_named.then_some(SelectedByShare { name, share: least, class })
 }
 
 #[cfg(test)]
@@ -128,7 +128,13 @@ mod tests {
 
     #[test]
     fn the_least_share_is_sure_enough_and_a_larger_one_surer() {
-        let at = |share| Material { name: EffectName::QuadraticDrag, share, class: Vec::new() }.confidence();
-        assert!(at(NAMED_SHARE) >= NAMED && at(0.5) > at(0.3) && at(0.9) < 1.0);
+        let confidence_at = |share| {
+            SelectedByShare { name: EffectName::QuadraticDrag, share, class: Vec::new() }.confidence()
+        };
+        assert!(
+            confidence_at(NAMED_SHARE) >= NAMED
+                && confidence_at(0.5) > confidence_at(0.3)
+                && confidence_at(0.9) < 1.0
+        );
     }
 }

@@ -42,7 +42,7 @@ pub(crate) enum Rejection {
     /// The effect would bend over this part of the travel, as only a spring that creeps does.
     Creeps { part: f64 },
     /// Something that has no name in the library explains it better.
-    Rather(Rather),
+    BetterExplanation(BetterExplanation),
     /// A larger effect in the same model is not in the library.
     BesideUnknown,
     /// More effects explain it as well than a class may hold.
@@ -64,7 +64,7 @@ pub(crate) enum Rejection {
 
 /// The better explanation of an effect's gain.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) enum Rather {
+pub(crate) enum BetterExplanation {
     /// Physics without a name in the library; a noun phrase.
     Unnamed { what: String },
     /// A force of a form that the effect cannot have: gains on left-out blocks, nats, of the form
@@ -80,5 +80,5 @@ pub(crate) enum Weakness {
     /// It explains a small part of what the noise leaves.
     SmallShare { share: f64 },
     /// This part of what the refit leaves beyond chance is still there with it.
-    LeftOver { part: f64 },
+    Unexplained { part: f64 },
 }

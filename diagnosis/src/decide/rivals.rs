@@ -2,7 +2,7 @@
 //! well form its class.
 
 use crate::data::rig::Kind;
-use crate::decide::material::Material;
+use crate::decide::material::SelectedByShare;
 use crate::decide::thresholds::{
     BEHIND_PART, BEHIND_SLOW_NATS, BEHIND_SLOW_Z, BEHIND_Z, LEADS_Z, MOST_IN_CLASS,
 };
@@ -16,7 +16,7 @@ use crate::fit::linear_fit::Fit;
 use crate::fit::model::Model;
 use crate::fit::noise::Colour;
 use crate::fit::nominal::Nominal;
-use crate::laws::definition::Shown;
+use crate::laws::definition::ExcitationLimits;
 use crate::laws::{Effect, EffectName};
 use crate::propose::context::{FitContext, FittedModel};
 use crate::propose::excitation::Excitation;
@@ -42,12 +42,12 @@ fn costs(candidate: &FittedModel, nominal: &Nominal, holdout: &[BlockedRecording
 pub(crate) fn fit_rivals(
     context: &FitContext,
     last: &FittedModel,
-    slow: &FittedModel,
+    coloured_fit: &FittedModel,
     holdout: &HoldoutSet,
     found: &mut [EffectEvidence],
 ) {
     let best = context.fit(last.model.clone(), &last.noise, Colour::White);
-    let contest = Contest { context, best: &best, slow, holdout };
+    let contest = Contest { context, best: &best, coloured_fit, holdout };
     for (i, found) in found.iter_mut().enumerate() {
         found.rivals = contest.rivals_of(i);
     }
@@ -59,7 +59,7 @@ struct Contest<'a> {
     /// The model under white noise.
     best: &'a FittedModel,
     /// The model under coloured noise.
-    slow: &'a FittedModel,
+    coloured_fit: &'a FittedModel,
     holdout: &'a HoldoutSet,
 }
 
@@ -78,7 +78,7 @@ impl Contest<'_> {
         less.effects.remove(i);
         let name = best.model.effects[i].name;
         let base_fit = Fit::new(&less, context.nominal, context.tracks, &best.noise);
-        let base = FittedModel { model: less, noise: best.noise, fit: base_fit, merit: 0.0 };
+        let base = FittedModel { model: less, noise: best.noise, fit: base_fit, log_score: 0.0 };
         let periodic = name.definition().has_own_phase();
         let others: Vec<(Effect, f64)> = context
             .screen(&base, &|other| other != name && (periodic || !other.definition().is_periodic()))
@@ -95,7 +95,7 @@ impl Contest<'_> {
         let Self { context, best, .. } = *self;
         let model = with(base, effect);
         let fit = Fit::new(&model, context.nominal, context.tracks, &best.noise);
-        let mut rival = FittedModel { model, noise: best.noise, fit, merit: 0.0 };
+        let mut rival = FittedModel { model, noise: best.noise, fit, log_score: 0.0 };
         // Both are judged where both know something.
         let holdout = self.holdout.judging(&best.model, context.span);
         let holdout = known(&holdout, &rival.model, context.span);
@@ -128,15 +128,16 @@ impl Contest<'_> {
 
     /// Puts those near rivals behind that only a white noise takes for as good as the winner.
     fn tell_apart_by_slow_noise(&self, base: &Model, others: &[(Effect, f64)], rivals: &mut [Rival]) {
-        let merit = |model: Model| self.context.fit_slow(model, &[&self.slow.noise]).merit;
+        let log_score =
+            |model: Model| self.context.fit_coloured(model, &[&self.coloured_fit.noise]).log_score;
         // Needed only where a rival is near, and the same for all of them.
         let mut without = None;
         let is_near = |rival: &Rival| rival.z < BEHIND_Z || rival.fit_z < -LEADS_Z;
         for (rival, (effect, _)) in rivals.iter_mut().zip(others).filter(|(rival, _)| is_near(rival)) {
-            let theirs = merit(with(base, effect));
-            let without = *without.get_or_insert_with(|| merit(base.clone()));
-            let behind = self.slow.merit - theirs;
-            if behind > 0.5 * (self.slow.merit - without) && behind > BEHIND_SLOW_NATS {
+            let theirs = log_score(with(base, effect));
+            let without = *without.get_or_insert_with(|| log_score(base.clone()));
+            let behind = self.coloured_fit.log_score - theirs;
+            if behind > 0.5 * (self.coloured_fit.log_score - without) && behind > BEHIND_SLOW_NATS {
                 (rival.z, rival.fit_z) = (rival.z.max(BEHIND_SLOW_Z), BEHIND_SLOW_Z);
                 rival.lead = rival.lead.max(behind);
             }
@@ -147,9 +148,9 @@ impl Contest<'_> {
 /// Returns the rival that leads by most on left-out stretches of the fitted recordings, with the
 /// place of the effect that it leads; none where no effect is led. Effects that shares of the force
 /// error name met their rivals there.
-pub(crate) fn leader(found: &[EffectEvidence], materials: &[Material]) -> Option<(usize, Effect)> {
+pub(crate) fn leader(found: &[EffectEvidence], materials: &[SelectedByShare]) -> Option<(usize, Effect)> {
     let leads = |rival: &&Rival| rival.fit_z < -LEADS_Z && !rival.is_absent;
-    let has_none = |one: &EffectEvidence| Material::find(materials, one.effect.name).is_none();
+    let has_none = |one: &EffectEvidence| SelectedByShare::find(materials, one.effect.name).is_none();
     let by_likelihood = found.iter().enumerate().filter(|(_, one)| has_none(one));
     let all = by_likelihood.flat_map(|(i, one)| one.rivals.iter().filter(leads).map(move |rival| (i, rival)));
     let is_new = |rival: &Rival| found.iter().all(|one| one.effect.name != rival.name);
@@ -166,12 +167,12 @@ pub(crate) fn class(
 ) -> Vec<EffectName> {
     let name = found.effect.name;
     let mut class = vec![name];
-    let shown = Shown {
+    let shown = ExcitationLimits {
         leaves_much,
         one_way: context.span.one_way,
         linear: context.nominal.rig.kind == Kind::Linear,
         count: context.span.count,
-        ..excitation.shown()
+        ..excitation.limits()
     };
     for twin in found.effect.twins(&shown) {
         if !class.contains(&twin) {
@@ -203,13 +204,13 @@ mod tests {
     #[test]
     fn an_unseen_gap_may_be_a_spring() {
         use EffectName as N;
-        let of = |name: N, shape: &[(&str, f64)], linear: bool| {
-            let shown = Shown { linear, count: 1e-6, ..Shown::default() };
+        let twins = |name: N, shape: &[(&str, f64)], linear: bool| {
+            let shown = ExcitationLimits { linear, count: 1e-6, ..ExcitationLimits::default() };
             Effect::shaped(name, shape).twins(&shown)
         };
-        assert_eq!(of(N::Backlash, &[("gap", 1.5e-6)], true), [N::DriveCompliance]);
-        assert!(of(N::Backlash, &[("gap", 3e-6)], true).is_empty());
-        assert_eq!(of(N::MassImbalance, &[], true), [N::Cogging]);
-        assert!(of(N::MassImbalance, &[], false).is_empty(), "there a mass turns");
+        assert_eq!(twins(N::Backlash, &[("gap", 1.5e-6)], true), [N::DriveCompliance]);
+        assert!(twins(N::Backlash, &[("gap", 3e-6)], true).is_empty());
+        assert_eq!(twins(N::MassImbalance, &[], true), [N::Cogging]);
+        assert!(twins(N::MassImbalance, &[], false).is_empty(), "there a mass turns");
     }
 }

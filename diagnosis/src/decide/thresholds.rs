@@ -59,8 +59,7 @@ pub(crate) const SHARE: f64 = 0.05;
 pub(crate) const FAIR_SHARE: f64 = 0.1;
 /// Share that is most of what was left out.
 pub(crate) const MOST_SHARE: f64 = 0.5;
-/// Least share of an effect that is hardly sure: a wandering bias looks like a small effect for the
-/// length of two recordings.
+/// Share required if z is below `SURE_Z`: drift imitates small effects.
 pub(crate) const UNSURE_SHARE: f64 = 0.7;
 /// Share from which an effect may rest on few moments: counts are lost now and then.
 pub(crate) const NEARLY_ALL_SHARE: f64 = 0.9;

@@ -5,7 +5,7 @@ use crate::data::schema::Verdict;
 use crate::decide::diagnosis::Reason;
 use crate::decide::thresholds::{DOMINANT, MATERIAL, UNDERSTOOD};
 use crate::decide::weighed_model::WeighedModel;
-use crate::evidence::comparison::Shown;
+use crate::evidence::comparison::ModelComparison;
 use crate::evidence::residual_maps::Map;
 use crate::evidence::residuals::{above, refit_matters};
 use crate::fit::blocked_recording::BlockedRecording;
@@ -15,7 +15,7 @@ use crate::propose::excitation::Excitation;
 
 /// Part of the force that must be left, on every recording, to say that the rig's model does not
 /// speak of these recordings.
-const FOREIGN: f64 = 0.85;
+const MISFIT_PART: f64 = 0.85;
 /// Part of the force, above the noise, that a disturbance must make up before it is called one.
 const DISTURBED: f64 = 0.05;
 /// Part of the refit's mean square that doubtful effects must leave at most for the mismatch to be
@@ -36,8 +36,8 @@ pub(crate) fn misfit(weighed: &WeighedModel, nominal: &Nominal, is_driven: bool)
     let is_another = weighed.effects.iter().any(|e| CommandLaw::new(&e.found.effect).is_some());
     let refitted = nominal.anchor.is_none() && (is_another || weighed.effects.is_empty());
     let judged = if refitted { table.refit } else { table.patched };
-    let fits_not = judged.holdout > FOREIGN * force.holdout
-        && judged.fit > FOREIGN * force.fit
+    let fits_not = judged.holdout > MISFIT_PART * force.holdout
+        && judged.fit > MISFIT_PART * force.fit
         && (is_another || table.patched.holdout > UNDERSTOOD.0 * force.holdout);
     (fits_not && is_driven).then(|| Reason::Misfit { left: judged.holdout / force.holdout.max(1e-300) })
 }
@@ -53,7 +53,7 @@ pub(crate) fn verdict(
     foreign: Option<Reason>,
     follows: &dyn Fn() -> Option<Reason>,
 ) -> (Verdict, Option<Reason>) {
-    let Shown { on_holdout, table, .. } = &weighed.shown;
+    let ModelComparison { on_holdout, table, .. } = &weighed.shown;
     let left = above(table.patched.holdout, weighed.floor, 0.0).sqrt();
     let disturbed = left > DISTURBED * table.force_rms.holdout;
     // What was found and is too unsure to be named still says that the mismatch repeats, if it

@@ -3,10 +3,10 @@
 use crate::data::schema::Parameter;
 use crate::decide::confidence::{self, Evidence};
 use crate::decide::elimination::RejectedHypothesis;
-use crate::decide::material::Material;
-use crate::decide::rejection::{Rather, Rejection};
+use crate::decide::material::SelectedByShare;
+use crate::decide::rejection::{BetterExplanation, Rejection};
 use crate::decide::thresholds::NAMED;
-use crate::evidence::comparison::Shown;
+use crate::evidence::comparison::ModelComparison;
 use crate::evidence::effect_evidence::EffectEvidence;
 use crate::evidence::tonal::TonalDisturbance;
 use crate::fit::force_residual::Estimator;
@@ -18,7 +18,7 @@ use std::collections::BTreeMap;
 pub(crate) struct WeighedEffect {
     pub(crate) found: EffectEvidence,
     /// Its part in the force error, where that names it.
-    pub(crate) material: Option<Material>,
+    pub(crate) material: Option<SelectedByShare>,
     pub(crate) class: Vec<EffectName>,
     pub(crate) evidence: Evidence,
     pub(crate) confidence: f64,
@@ -29,7 +29,7 @@ pub(crate) struct WeighedEffect {
     /// Part of the travel over which it bends, where that is more than bristles bend.
     pub(crate) creeps: Option<f64>,
     /// The better explanation, where something without a name explains significantly more.
-    pub(crate) rather: Option<Rather>,
+    pub(crate) rather: Option<BetterExplanation>,
 }
 
 impl WeighedEffect {
@@ -44,12 +44,12 @@ pub(crate) struct WeighedModel {
     /// The effects that were removed because they were unsure.
     pub(crate) dropped: Vec<WeighedEffect>,
     /// The model under coloured noise.
-    pub(crate) slow: FittedModel,
+    pub(crate) coloured_fit: FittedModel,
     /// The hypotheses that were rejected on the way.
     pub(crate) rejected: Vec<RejectedHypothesis>,
     /// The effects that shares of the force error name.
-    pub(crate) materials: Vec<Material>,
-    pub(crate) shown: Shown,
+    pub(crate) materials: Vec<SelectedByShare>,
+    pub(crate) shown: ModelComparison,
     pub(crate) estimator: Estimator,
     /// Residual that reading whole counts alone causes, N·m or N.
     pub(crate) floor: f64,
@@ -75,7 +75,7 @@ impl WeighedModel {
 
     /// The effect that explains most, with what it would rather be, where something without a name
     /// explains more.
-    pub(crate) fn resembled(&self) -> Option<(EffectName, Rather)> {
+    pub(crate) fn resembled(&self) -> Option<(EffectName, BetterExplanation)> {
         let most = self.effects.iter().max_by(|a, b| a.found.holdout.sum.total_cmp(&b.found.holdout.sum))?;
         Some((most.found.effect.name, most.rather.clone()?))
     }
@@ -163,7 +163,7 @@ impl WeighedModel {
         } else if let Some(part) = assessed.creeps {
             Some(Rejection::Creeps { part })
         } else if let Some(rather) = &assessed.rather {
-            Some(Rejection::Rather(rather.clone()))
+            Some(Rejection::BetterExplanation(rather.clone()))
         } else if self.effects.iter().any(|other| other.rather.is_some() && other.explains_more(assessed)) {
             Some(Rejection::BesideUnknown)
         } else {

@@ -38,7 +38,7 @@ pub(crate) fn widened(
         // The last effect is the one whose shape moves.
         model.effects.extend([rival.effect.clone(), own]);
         let both = context.polish_one(&context.fit(model, &alone.noise, Colour::White));
-        if both.merit > alone.merit {
+        if both.log_score > alone.log_score {
             widen(&mut values, &before, &parameters(context, &both, both.model.effects.len() - 1));
         }
     }

@@ -9,8 +9,8 @@ use crate::evidence::residuals::{drive_force, forces};
 use crate::fit::force_residual::Estimator;
 use crate::fit::linear_fit::Fit;
 use crate::fit::model::Model;
-use crate::fit::nominal::{Kept, Key};
-use crate::laws::definition::Shown;
+use crate::fit::nominal::{InertiaSource, Key};
+use crate::laws::definition::ExcitationLimits;
 use crate::laws::{Effect, EffectName};
 use crate::propose::excitation::Excitation;
 use crate::propose::untested::{self, NotTested};
@@ -72,11 +72,11 @@ pub(crate) fn check(rig: &Rig, checked: &Checked, prepared: &Prepared) -> Check 
         recordings: all.map(|one| seen(one, rig)).collect(),
         faults: checked.faults.clone(),
         late_rows: prepared.nominal.skew_rows,
-        is_inertia_hidden: prepared.nominal.kept_inertia == Some(Kept::OfRig)
+        is_inertia_hidden: prepared.nominal.kept_inertia == Some(InertiaSource::OfRig)
             || prepared.nominal.virtual_inertia > 0.0,
         excitation,
         alike: alike(&fit),
-        twins: twins(&prepared.shown(&prepared.fit), &untested),
+        twins: twins(&prepared.limits(&prepared.fit), &untested),
         untested,
         left: left / force,
         noise: noise / force,
@@ -101,19 +101,23 @@ fn seen(recording: &Recording, rig: &Rig) -> Seen {
     }
 }
 
-/// Pairs of values of the rig whose errors go together in a fit.
-fn alike(fit: &Fit) -> Vec<(&'static str, &'static str, f64)> {
-    let word = |key: Key| match key {
+/// A value of the rig in words; none for what is no value of it.
+fn in_words(key: Key) -> Option<&'static str> {
+    match key {
         Key::Gain => Some("inertia over gain"),
         Key::Viscous => Some("viscous friction"),
         Key::Coulomb => Some("dry friction"),
         Key::Weight => Some("the weight under the tilt"),
         Key::Gravity => Some("gravity"),
         _ => None,
-    };
+    }
+}
+
+/// Pairs of values of the rig whose errors go together in a fit.
+fn alike(fit: &Fit) -> Vec<(&'static str, &'static str, f64)> {
     let covariance = &fit.solution.covariance;
     let values: Vec<(usize, &'static str)> =
-        fit.keys.iter().enumerate().filter_map(|(i, (key, _))| Some((i, word(*key)?))).collect();
+        fit.keys.iter().enumerate().filter_map(|(i, (key, _))| Some((i, in_words(*key)?))).collect();
     let correlation = |i: usize, j: usize| {
         covariance.at(i, j) / (covariance.at(i, i) * covariance.at(j, j)).sqrt().max(1e-300)
     };
@@ -125,7 +129,7 @@ fn alike(fit: &Fit) -> Vec<(&'static str, &'static str, f64)> {
 }
 
 /// Effects that are tested and have the same shape in all such motion.
-fn twins(shown: &Shown, untested: &[(EffectName, NotTested)]) -> Vec<[EffectName; 2]> {
+fn twins(shown: &ExcitationLimits, untested: &[(EffectName, NotTested)]) -> Vec<[EffectName; 2]> {
     let is_tested =
         |name: &EffectName| name.definition().is_sought() && untested.iter().all(|(other, _)| other != name);
     let mut pairs: Vec<[EffectName; 2]> = Vec::new();

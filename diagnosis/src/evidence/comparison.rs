@@ -8,7 +8,7 @@ use crate::fit::force_residual::Estimator;
 use crate::propose::context::{FitContext, FittedModel};
 
 /// A fitted model with what it leaves.
-pub(crate) struct Shown {
+pub(crate) struct ModelComparison {
     pub(crate) patched: FittedModel,
     pub(crate) on_fit: Residuals,
     pub(crate) on_holdout: Residuals,
@@ -18,7 +18,7 @@ pub(crate) struct Shown {
     pub(crate) keeps_nominal: bool,
 }
 
-impl Shown {
+impl ModelComparison {
     /// Lays a fitted model and the refit on all recordings, under one estimator.
     pub(crate) fn new(
         context: &FitContext,

@@ -84,8 +84,7 @@ pub(crate) fn gather_evidence(
     let judging = holdout.judging(&last.model, context.span);
     let shown = holdout.shown(&last.model, context.span);
     let judged = JudgedModel::new(context, last, &judging, &shown);
-    let one = |i| judged.evidence(i, slow, &asks_for_score);
-    (0..last.model.effects.len()).map(one).collect()
+    (0..last.model.effects.len()).map(|i| judged.evidence(i, slow, &asks_for_score)).collect()
 }
 
 /// A model with what it leaves, to be compared with the model without one of its effects.
@@ -120,16 +119,16 @@ impl<'a> JudgedModel<'a> {
         shown: &'a [BlockedRecording],
     ) -> Self {
         let null = Fit::new(&Model::default(), context.nominal, context.tracks, &last.noise);
-        let null = FittedModel { model: Model::default(), noise: last.noise, fit: null, merit: 0.0 };
+        let null = FittedModel { model: Model::default(), noise: last.noise, fit: null, log_score: 0.0 };
         let estimator = Estimator::new(context.tracks, &last.noise, context.scale);
-        let left = |model: &FittedModel| left_force(context, &estimator, shown, model, &last.noise);
+        let force_left = |model: &FittedModel| left_force(context, &estimator, shown, model, &last.noise);
         let inertia = parameters::scale(context.nominal, last).0;
         let count = 1.0 / context.nominal.rig.encoder.counts_per_unit;
         let explainable = |left: &[Vec<f64>], tracks: &[BlockedRecording]| {
             let floor = estimator.counting(tracks, &last.noise, count) * inertia;
             above(estimator.rms(left, tracks), floor, LEAST_EXPLAINABLE).max(1e-300)
         };
-        let by_null = left(&null);
+        let by_null = force_left(&null);
         Self {
             context,
             last,
@@ -137,7 +136,7 @@ impl<'a> JudgedModel<'a> {
             shown,
             on_holdout: evaluate_all(last, context.nominal, judging, &last.noise),
             on_fit: left_out_costs(&last.fit),
-            left: left(last),
+            left: force_left(last),
             explainable: [
                 explainable(&by_null.fitted, context.tracks),
                 explainable(&by_null.held_out, shown),
@@ -157,7 +156,7 @@ impl<'a> JudgedModel<'a> {
         let mut less = last.model.clone();
         let effect = less.effects.remove(i);
         let fit = Fit::new(&less, context.nominal, context.tracks, &last.noise);
-        let without = FittedModel { model: less, noise: last.noise, fit, merit: 0.0 };
+        let without = FittedModel { model: less, noise: last.noise, fit, log_score: 0.0 };
         let without_fit = left_out_costs(&without.fit);
         let gains: Vec<f64> = without_fit.iter().zip(&self.on_fit).map(|(a, b)| a - b).collect();
         let evaluated = evaluate_all(&without, context.nominal, judging, &last.noise);
@@ -231,11 +230,12 @@ fn left_force(
     noise: &Noise,
 ) -> LeftForce {
     let inertia = parameters::scale(context.nominal, model).0;
-    let left = |tracks: &[BlockedRecording], totals: &[Total]| forces(estimator, tracks, totals, inertia);
+    let forces_left =
+        |tracks: &[BlockedRecording], totals: &[Total]| forces(estimator, tracks, totals, inertia);
     let evaluated = evaluate_all(model, context.nominal, holdout, noise);
     LeftForce {
-        fitted: left(context.tracks, &model.fit.totals(context.tracks)),
-        held_out: left(holdout, &evaluated.into_iter().map(|one| one.total).collect::<Vec<_>>()),
+        fitted: forces_left(context.tracks, &model.fit.totals(context.tracks)),
+        held_out: forces_left(holdout, &evaluated.into_iter().map(|one| one.total).collect::<Vec<_>>()),
     }
 }
 
@@ -249,16 +249,16 @@ fn score_z_of(
     holdout: &[BlockedRecording],
 ) -> f64 {
     // The residual, and what the model pays, on fitted and on held-out recordings.
-    let left = |model: &Model| {
+    let residuals_and_costs = |model: &Model| {
         let fit = Fit::new(model, context.nominal, context.tracks, noise);
-        let fitted = FittedModel { model: model.clone(), noise: *noise, fit, merit: 0.0 };
+        let fitted = FittedModel { model: model.clone(), noise: *noise, fit, log_score: 0.0 };
         let evaluated = evaluate_all(&fitted, context.nominal, holdout, noise);
         let on_holdout: Vec<f64> = evaluated.iter().flat_map(|one| one.residual.iter().copied()).collect();
         let paid: f64 = fitted.fit.prepared.iter().map(Prepared::surcharge).sum();
         let paid_on_holdout: f64 = evaluated.iter().map(|one| one.surcharge).sum();
         [(left_out_residuals(&fitted.fit), paid), (on_holdout, paid_on_holdout)]
     };
-    let both = left(with).into_iter().zip(left(without));
+    let both = residuals_and_costs(with).into_iter().zip(residuals_and_costs(without));
     both.map(|((with, paid), (without, before))| score_z(&with, &without, paid - before))
         .fold(f64::INFINITY, f64::min)
 }

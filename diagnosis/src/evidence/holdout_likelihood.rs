@@ -10,8 +10,8 @@ use crate::fit::linear_fit::{Fit, Prepared};
 use crate::fit::model::{Model, total};
 use crate::fit::nominal::{Key, Nominal};
 use crate::propose::context::FittedModel;
-use crate::propose::joint;
 use crate::propose::predictive::{FOLDS, fold_of};
+use crate::propose::two_mass;
 use numerics::bootstrap::{Gain, bootstrap};
 use numerics::linear::Square;
 use numerics::parallel;
@@ -35,21 +35,10 @@ pub(crate) struct HoldoutFit {
 /// recordings' phases undone.
 fn pattern(fit: &Fit, model: &Model, effect: usize) -> Vec<(f64, f64, f64)> {
     let waves: Vec<f64> = waves_of(model, effect);
-    let of = |r: usize| -> Vec<(f64, f64, f64)> {
-        let theta = fit.theta(r);
-        let terms: Vec<f64> = fit.prepared[r]
-            .columns
-            .iter()
-            .zip(&theta)
-            .filter(|(c, _)| matches!(c.key, Key::Term { effect: e, .. } if e == effect))
-            .map(|(_, theta)| *theta)
-            .collect();
-        waves.iter().zip(terms.chunks_exact(2)).map(|(w, t)| (*w, t[0], t[1])).collect()
-    };
-    let mut sum = of(0);
+    let mut sum = own_pattern(fit, &waves, effect, 0);
     let commensurate = model.effects[effect].turn().is_some();
     for r in 1..fit.prepared.len() {
-        let other = of(r);
+        let other = own_pattern(fit, &waves, effect, r);
         let groups: Vec<Vec<usize>> = groups(waves.len(), commensurate);
         for group in groups {
             let reach = group.iter().map(|i| std::f64::consts::TAU / waves[*i]).fold(0.0, f64::max);
@@ -65,6 +54,17 @@ fn pattern(fit: &Fit, model: &Model, effect: usize) -> Vec<(f64, f64, f64)> {
         }
     }
     sum
+}
+
+/// The same with the phases that one recording has.
+fn own_pattern(fit: &Fit, waves: &[f64], effect: usize, recording: usize) -> Vec<(f64, f64, f64)> {
+    let theta = fit.theta(recording);
+    let columns = fit.prepared[recording].columns.iter().zip(&theta);
+    let terms: Vec<f64> = columns
+        .filter(|(c, _)| matches!(c.key, Key::Term { effect: e, .. } if e == effect))
+        .map(|(_, theta)| *theta)
+        .collect();
+    waves.iter().zip(terms.chunks_exact(2)).map(|(w, t)| (*w, t[0], t[1])).collect()
 }
 
 pub(crate) fn waves_of(model: &Model, effect: usize) -> Vec<f64> {
@@ -101,16 +101,16 @@ fn turned((w, c, s): (f64, f64, f64), shift: f64) -> (f64, f64, f64) {
 fn best_shift(period: f64, highest: f64, value: impl Fn(f64) -> f64) -> f64 {
     let cycles = (period * highest / std::f64::consts::TAU).max(1.0);
     let count = (8.0 * cycles).ceil().clamp(16.0, 4000.0) as usize;
-    let at = |i: usize| period * i as f64 / count as f64;
+    let grid_shift = |i: usize| period * i as f64 / count as f64;
     let mut best = (0, f64::NEG_INFINITY);
     for i in 0..count {
-        let v = value(at(i));
+        let v = value(grid_shift(i));
         if v > best.1 {
             best = (i, v);
         }
     }
     let width = period / count as f64;
-    numerics::golden_section::golden(at(best.0) - width, at(best.0) + width, 12, value)
+    numerics::golden_section::golden(grid_shift(best.0) - width, grid_shift(best.0) + width, 12, value)
 }
 
 /// Lays a fitted model on a held-out recording under a noise.
@@ -121,7 +121,7 @@ pub(crate) fn evaluate(
     noise: &Noise,
 ) -> HoldoutFit {
     let mut evaluated = evaluate_once(candidate, nominal, track, noise);
-    if candidate.model.effects.iter().any(joint::is_joint) {
+    if candidate.model.effects.iter().any(two_mass::is_joint) {
         // The law of a joint takes up the force that is there all the time, which evaluating it
         // finds.
         let mut own = track.clone();
@@ -269,7 +269,7 @@ impl LikelihoodSums {
                         .iter()
                         .map(|i| self.pull(*i, &theta, one, |j| !columns.contains(&j)))
                         .collect();
-                    let at = |shift: f64| -> Vec<f64> {
+                    let amplitudes = |shift: f64| -> Vec<f64> {
                         let wave = |i: &usize| {
                             let (_, c, s) = turned(shape[*i], shift);
                             [c, s]
@@ -277,7 +277,7 @@ impl LikelihoodSums {
                         group.iter().flat_map(wave).collect()
                     };
                     let gain = |shift: f64| {
-                        let x = at(shift);
+                        let x = amplitudes(shift);
                         let row = |i: usize| -> f64 {
                             columns.iter().zip(&x).map(|(j, x)| self.m.at(i, *j) * x).sum()
                         };
@@ -285,7 +285,7 @@ impl LikelihoodSums {
                         terms.map(|((i, x), pull)| x * (pull - 0.5 * row(*i))).sum()
                     };
                     let shift = best_shift(*reach, *most, gain);
-                    for (i, x) in columns.iter().zip(at(shift)) {
+                    for (i, x) in columns.iter().zip(amplitudes(shift)) {
                         theta[*i] = x;
                     }
                 }
@@ -328,7 +328,7 @@ mod tests {
         let noise = Noise { sensor: 1.0, white: 1e-3, slow: 100.0, tau: 0.01, rest: 1.0, blur: 0.0 };
         let model = Model::default();
         let fit = Fit::new(&model, &nominal, std::slice::from_ref(&track), &noise);
-        let fitted = FittedModel { model, noise, fit, merit: 0.0 };
+        let fitted = FittedModel { model, noise, fit, log_score: 0.0 };
         let evaluated = evaluate(&fitted, &nominal, &track, &noise);
         let of_fold = |fold: usize| {
             (0..track.segment_count()).find(|s| fold_of(0, *s) == fold).expect("it is long enough")

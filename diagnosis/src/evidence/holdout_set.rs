@@ -1,5 +1,5 @@
-//! Held-out recordings with the motion that a fitted model sees in them, estimated twice: what
-//! judges a name may know no later row, and how large a force is left is best seen from all rows.
+//! Held-out recordings with the motion that a fitted model sees in them, in two estimates: a causal
+//! one for likelihoods and a smoothed one for force errors.
 
 use crate::evidence::holdout_likelihood::evaluate_all;
 use crate::evidence::known_travel::known;

@@ -47,15 +47,15 @@ pub(crate) struct BeyondFitted {
 /// The travel that held-out recordings cover and no fitted one does, if the model depends on it.
 pub(crate) fn beyond(tracks: &[BlockedRecording], model: &Model, span: &Span) -> Option<BeyondFitted> {
     let known = known(tracks, model, span);
-    let is_told = |track: &BlockedRecording| {
+    let is_known = |track: &BlockedRecording| {
         let unknown = track.unknown.iter().filter(|unknown| **unknown).count();
         unknown as f64 > TOLD * track.block_count() as f64
     };
-    if !known.iter().any(is_told) {
+    if !known.iter().any(is_known) {
         return None;
     }
-    let all = || known.iter().flat_map(BlockedRecording::places);
-    let (from, to) = (all().fold(span.low, f64::min), all().fold(span.high, f64::max));
+    let places = || known.iter().flat_map(BlockedRecording::places);
+    let (from, to) = (places().fold(span.low, f64::min), places().fold(span.high, f64::max));
     Some(BeyondFitted { from, to, low: span.low, high: span.high })
 }
 

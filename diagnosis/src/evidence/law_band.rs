@@ -37,9 +37,9 @@ impl Band {
         let mut blocks = by_values(context, estimator, fitted);
         let ends = shapes_at_ends(&fitted.model, named);
         if !ends.is_empty() {
-            let left = |model: Model| left(context, estimator, &context.fit_at(model, &fitted.noise));
-            let here = left(fitted.model.clone());
-            for end in ends.into_iter().map(left) {
+            let left_by = |model: Model| left(context, estimator, &context.fit_at(model, &fitted.noise));
+            let here = left_by(fitted.model.clone());
+            for end in ends.into_iter().map(left_by) {
                 add(&mut blocks, &here, &end);
             }
         }

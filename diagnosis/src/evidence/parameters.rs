@@ -71,7 +71,7 @@ pub(crate) fn robust_covariance(candidate: &FittedModel) -> Square {
 
 /// Relative standard deviation of a shape value from the curvature of the likelihood.
 pub(crate) fn shape_sd(context: &FitContext, candidate: &FittedModel, effect: usize, key: &str) -> f64 {
-    let at = |factor: f64| {
+    let likelihood = |factor: f64| {
         let mut model = candidate.model.clone();
         let value = model.effects[effect].shape[key];
         model.effects[effect].shape.insert(key.to_owned(), value * factor);
@@ -81,7 +81,7 @@ pub(crate) fn shape_sd(context: &FitContext, candidate: &FittedModel, effect: us
     let here = candidate.fit.log_likelihood;
     let mut step = 0.02_f64;
     for _ in 0..5 {
-        let drop = here - 0.5 * (at(step.exp()) + at((-step).exp()));
+        let drop = here - 0.5 * (likelihood(step.exp()) + likelihood((-step).exp()));
         if drop > 0.5 {
             // Twofold for shapes of another family than the one fitted.
             return (step * step / (2.0 * drop)).sqrt() * 1.5;

@@ -6,7 +6,7 @@ use crate::fit::blocked_recording::BlockedRecording;
 use crate::fit::filter::Noise;
 use crate::fit::nominal::Nominal;
 use crate::laws::EffectName;
-use crate::laws::definition::{Shown, Span};
+use crate::laws::definition::{ExcitationLimits, Span};
 use crate::propose::context::FitContext;
 use crate::propose::excitation::Excitation;
 
@@ -36,9 +36,9 @@ impl Prepared {
     }
 
     /// The facts about the axis that recordings in some motion show.
-    pub(crate) fn shown(&self, tracks: &[BlockedRecording]) -> Shown {
+    pub(crate) fn limits(&self, tracks: &[BlockedRecording]) -> ExcitationLimits {
         let (count, rig) = (self.span.count, &self.nominal.rig);
-        let excitation = Excitation::of(tracks, count, rig.turn()).shown();
-        Shown { one_way: self.span.one_way, linear: rig.kind == Kind::Linear, count, ..excitation }
+        let excitation = Excitation::of(tracks, count, rig.turn()).limits();
+        ExcitationLimits { one_way: self.span.one_way, linear: rig.kind == Kind::Linear, count, ..excitation }
     }
 }

@@ -13,7 +13,7 @@ const SAME_MOTION: f64 = 0.97;
 /// The smallest correlation of residuals that repeat, and the standard errors by which it must
 /// exceed chance.
 const REPEATS: f64 = 0.5;
-const SURELY: f64 = 4.0;
+const REPEATS_Z: f64 = 4.0;
 /// Shortest stretch that is compared, s, and shift within which recordings are aligned, s.
 const SHORTEST_S: f64 = 1.0;
 const SHIFT_S: f64 = 1.0;
@@ -72,15 +72,15 @@ pub(crate) fn correlation_of_repeats(
     };
     for (i, a) in all.iter().enumerate() {
         for b in &all[i + 1..] {
-            let at = |lag: usize, first: &Sampled, second: &Sampled| {
+            let correlations = |lag: usize, first: &Sampled, second: &Sampled| {
                 let from = lag.min(first.motion.len());
-                let of =
+                let rows_from =
                     |one: &Sampled, from: usize| (one.motion[from..].to_vec(), one.left[from..].to_vec());
-                let (a, b) = (of(first, from), of(second, 0));
+                let (a, b) = (rows_from(first, from), rows_from(second, 0));
                 let n = a.0.len().min(b.0.len());
                 (correlation(&a.0[..n], &b.0[..n]), compared((&a.0, &a.1), (&b.0, &b.1)))
             };
-            let lags = (0..=shift).flat_map(|lag| [at(lag, a, b), at(lag, b, a)]);
+            let lags = (0..=shift).flat_map(|lag| [correlations(lag, a, b), correlations(lag, b, a)]);
             add(lags.max_by(|x, y| x.0.total_cmp(&y.0)).and_then(|(_, found)| found));
         }
         // The shortest period after which the motion is the same again.
@@ -96,7 +96,7 @@ pub(crate) fn correlation_of_repeats(
     }
     let correlation = sum / f64::max(samples, 1.0);
     let independent = samples * (independent_hz / RATE_HZ).min(1.0);
-    (correlation > REPEATS && correlation * independent.sqrt() > SURELY).then_some(correlation)
+    (correlation > REPEATS && correlation * independent.sqrt() > REPEATS_Z).then_some(correlation)
 }
 
 /// True if the motion differs within a period: a slow one is like itself a moment later too.

@@ -49,12 +49,12 @@ impl<'a> Seen<'a> {
         name: &str,
         turn: Option<f64>,
     ) -> Vec<Self> {
-        let one = |(track, residual): (&'a BlockedRecording, &'a Vec<f64>)| Seen {
+        let seen = |(track, residual): (&'a BlockedRecording, &'a Vec<f64>)| Seen {
             track,
             residual,
             values: variable(track, name, turn),
         };
-        tracks.iter().zip(residuals).map(one).collect()
+        tracks.iter().zip(residuals).map(seen).collect()
     }
 
     fn moving(&self) -> impl Iterator<Item = usize> + '_ {
@@ -76,8 +76,8 @@ impl Bins {
     fn of(seen: &[Seen]) -> Self {
         let mut all: Vec<f64> = seen.iter().flat_map(|one| one.values.iter().copied()).collect();
         all.sort_by(f64::total_cmp);
-        let at = |p: usize| all[(all.len() - 1) * p / 1000];
-        Self { low: at(3), high: at(997).max(at(3) + 1e-12) }
+        let quantile = |p: usize| all[(all.len() - 1) * p / 1000];
+        Self { low: quantile(3), high: quantile(997).max(quantile(3) + 1e-12) }
     }
 
     fn edges(&self) -> Vec<f64> {
@@ -214,14 +214,14 @@ pub(crate) fn range(values: &[f64], weights: &[f64]) -> Option<(f64, f64)> {
         values.iter().copied().zip(weights.iter().copied()).filter(|(_, w)| *w > 0.0).collect();
     pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
     let whole: f64 = pairs.iter().map(|p| p.1).sum();
-    let at = |part: f64| {
+    let quantile = |part: f64| {
         let mut sum = 0.0;
         pairs.iter().find(|p| {
             sum += p.1;
             sum >= part * whole
         })
     };
-    Some((at(0.05)?.0, at(0.95)?.0))
+    Some((quantile(0.05)?.0, quantile(0.95)?.0))
 }
 
 #[cfg(test)]

@@ -108,18 +108,18 @@ pub(crate) fn refit_matters(
     force: f64,
 ) -> bool {
     let unbiased = |residuals: &[Vec<f64>]| -> Vec<Vec<f64>> {
-        let centred = |(x, track): (&Vec<f64>, &BlockedRecording)| {
-            let moving = estimator.moving(track);
-            let (sum, n) =
-                x.iter().zip(&moving).filter(|(_, m)| **m).fold((0.0, 0.0), |a, (x, _)| (a.0 + x, a.1 + 1.0));
-            let mean = if n > 0.0 { sum / n } else { 0.0 };
-            x.iter().map(|x| x - mean).collect()
-        };
-        residuals.iter().zip(tracks).map(centred).collect()
+        residuals.iter().zip(tracks).map(|(x, track)| centred(x, &estimator.moving(track))).collect()
     };
     let (before, after) = (unbiased(&holdout.nominal), unbiased(&holdout.refit));
     let taken = estimator.rms(&before, tracks).powi(2) - estimator.rms(&after, tracks).powi(2);
     taken > (REFIT_MATTERS * force).powi(2) && relative_gain(estimator, tracks, &before, &after).low > 0.0
+}
+
+/// A residual less its mean where the axis moves.
+fn centred(x: &[f64], moving: &[bool]) -> Vec<f64> {
+    let moving: Vec<f64> = x.iter().zip(moving).filter(|(_, m)| **m).map(|(x, _)| *x).collect();
+    let mean = moving.iter().sum::<f64>() / (moving.len() as f64).max(1.0);
+    x.iter().map(|x| x - mean).collect()
 }
 
 /// Relative reduction of the held-out mean square.

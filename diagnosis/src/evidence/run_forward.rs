@@ -19,23 +19,25 @@ pub(crate) fn simulated(nominal: &Rig, refit: &Rig, patched: &Rig, holdout: &[Re
     holdout.iter().map(|recording| Comparison::new(recording, &models, &WINDOWS_S)).collect()
 }
 
+/// Root mean square of a figure of a model over the time of all recordings that have it.
+fn rms_over_time(all: &[Comparison], model: &str, figure: &dyn Fn(&Figures) -> Option<f64>) -> Option<f64> {
+    let (mut sum, mut seconds) = (0.0, 0.0);
+    for one in all {
+        let Some(x) = one.figures(model).and_then(figure) else { continue };
+        let long = one.motion.seconds();
+        sum += long * x * x;
+        seconds += long;
+    }
+    (seconds > 0.0).then(|| (sum / seconds).sqrt())
+}
+
 /// Root mean square over all held-out recordings.
 pub(crate) fn pooled(simulated: &[Comparison]) -> Option<Simulation> {
     let first = simulated.first()?;
-    let mean = |model: &str, of: &dyn Fn(&Figures) -> Option<f64>| -> Option<f64> {
-        let (mut sum, mut seconds) = (0.0, 0.0);
-        for one in simulated {
-            let Some(x) = one.figures(model).and_then(of) else { continue };
-            let long = one.motion.seconds();
-            sum += long * x * x;
-            seconds += long;
-        }
-        (seconds > 0.0).then(|| (sum / seconds).sqrt())
-    };
     let by_model = |of: &dyn Fn(&Figures) -> Option<f64>| ByModel {
-        nominal: mean("nominal", of),
-        refit: mean("refit", of),
-        patched: mean("patched", of),
+        nominal: rms_over_time(simulated, "nominal", of),
+        refit: rms_over_time(simulated, "refit", of),
+        patched: rms_over_time(simulated, "patched", of),
     };
     let windows = WINDOWS_S
         .into_iter()

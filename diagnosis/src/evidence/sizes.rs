@@ -10,10 +10,10 @@ const PLAYED: f64 = 0.03;
 /// Returns the sizes on the recordings that excite an effect, fitted ones first.
 pub(crate) fn played(fitted: Vec<Size>, holdout: Vec<Size>) -> Vec<f64> {
     let most = fitted.iter().chain(&holdout).map(|size| size.square).fold(0.0, f64::max);
-    let of = |sizes: Vec<Size>| -> Vec<f64> {
+    let factors = |sizes: Vec<Size>| -> Vec<f64> {
         sizes.iter().filter(|size| size.square >= PLAYED * most).map(|size| size.factor).collect()
     };
-    let (fitted, holdout) = (of(fitted), of(holdout));
+    let (fitted, holdout) = (factors(fitted), factors(holdout));
     if fitted.is_empty() || holdout.is_empty() { Vec::new() } else { [fitted, holdout].concat() }
 }
 
@@ -33,7 +33,7 @@ pub(crate) fn sizes_on(
     with: &[Vec<f64>],
     without: &[Vec<f64>],
 ) -> Vec<Size> {
-    let one = |(track, (with, without)): (&BlockedRecording, (&Vec<f64>, &Vec<f64>))| {
+    let size = |(track, (with, without)): (&BlockedRecording, (&Vec<f64>, &Vec<f64>))| {
         let (mut along, mut square, mut moving) = (0.0, 0.0, 0.0);
         for (j, _) in estimator.moving(track).iter().enumerate().filter(|(_, moving)| **moving) {
             let done = without[j] - with[j];
@@ -43,7 +43,7 @@ pub(crate) fn sizes_on(
         }
         Size { factor: 1.0 + along / f64::max(square, 1e-300), square: square / f64::max(moving, 1.0) }
     };
-    tracks.iter().zip(with.iter().zip(without)).map(one).collect()
+    tracks.iter().zip(with.iter().zip(without)).map(size).collect()
 }
 
 #[cfg(test)]

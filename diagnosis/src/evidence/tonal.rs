@@ -12,17 +12,14 @@ use std::f64::consts::TAU;
 const OVERSAMPLED: f64 = 2.6;
 /// Fewest cycles over the longest recording: less is a drift.
 const FEWEST_CYCLES: f64 = 12.0;
-/// Most of the motion, as parts of its mean square, that may be at the frequency of a swing that
-/// does not follow it, for a light axis gives way to it, and that may be about as fast otherwise:
-/// what repeats with the motion swings too, at its frequency and multiples of it. The smaller the
-/// part of the residual without the swing, the larger both are, up to `ROOM` times, because a force
-/// that repeats with the motion leaves a large residual.
+/// At most 6 % of the motion's power may be at the tone and 2 % near it, both scaled up to 4× where
+/// the tone is most of the residual. A light axis gives way to a tone; a force that repeats with
+/// the motion swings at its frequency too, and leaves a large residual.
 const GIVES_WAY: f64 = 0.06;
 const FAST_MOTION: f64 = 0.02;
 const ROOM: f64 = 4.0;
-/// Most that the drive may do at that frequency, over the swing's mean square: a loop answers what
-/// comes from outside with half as much again at most, and what a lag or a short delay leaves is
-/// less than the drive makes.
+/// Most power of the drive at that frequency, over the tone's. A loop answers an outside force with
+/// 1.5 times its amplitude at most; a lag or a short delay leaves less than the drive makes.
 const DRIVEN: f64 = 2.25;
 
 /// A force at one frequency on the held-out recordings.
@@ -34,7 +31,7 @@ pub(crate) struct TonalDisturbance {
 }
 
 /// The drive's force, and the residual of the refitted model.
-pub(crate) struct Left<'a> {
+pub(crate) struct ResidualView<'a> {
     pub(crate) tracks: &'a [BlockedRecording],
     pub(crate) force: &'a [Vec<f64>],
     pub(crate) refit: &'a [Vec<f64>],
@@ -47,21 +44,20 @@ struct Samples {
 }
 
 fn samples(estimator: &Estimator, tracks: &[BlockedRecording], signals: &[Vec<f64>]) -> Vec<Samples> {
-    let one = |(track, signal): (&BlockedRecording, &Vec<f64>)| {
-        let rate = track.block_rate();
-        let every = (rate / (OVERSAMPLED * estimator.bandwidth_hz)).floor().max(1.0) as usize;
-        let moving: Vec<f64> = signal
-            .iter()
-            .zip(estimator.moving(track))
-            .map(|(x, moving)| if moving { *x } else { 0.0 })
-            .collect();
-        let mean = |chunk: &[f64]| chunk.iter().sum::<f64>() / every as f64;
-        Samples { step_s: every as f64 / rate, values: moving.chunks_exact(every).map(mean).collect() }
-    };
-    tracks.iter().zip(signals).map(one).collect()
+    tracks.iter().zip(signals).map(|(track, signal)| Samples::new(estimator, track, signal)).collect()
 }
 
 impl Samples {
+    /// A signal over blocks, thinned by means; zero where the axis rests.
+    fn new(estimator: &Estimator, track: &BlockedRecording, signal: &[f64]) -> Self {
+        let rate = track.block_rate();
+        let every = (rate / (OVERSAMPLED * estimator.bandwidth_hz)).floor().max(1.0) as usize;
+        let blocks = signal.iter().zip(estimator.moving(track));
+        let moving: Vec<f64> = blocks.map(|(x, moving)| if moving { *x } else { 0.0 }).collect();
+        let mean = |chunk: &[f64]| chunk.iter().sum::<f64>() / every as f64;
+        Self { step_s: every as f64 / rate, values: moving.chunks_exact(every).map(mean).collect() }
+    }
+
     fn seconds(&self) -> f64 {
         self.step_s * self.values.len() as f64
     }
@@ -78,6 +74,21 @@ impl Samples {
         }
         2.0 * (along_cos.powi(2) + along_sin.powi(2)) / self.values.len().max(1) as f64
     }
+
+    /// Sum of squares of what is about as fast as `hertz` or faster: of what a mean over a period
+    /// leaves.
+    fn faster_than(&self, hertz: f64) -> f64 {
+        let reach = ((0.5 / hertz / self.step_s).round() as usize).max(1);
+        let Some(first) = self.values.get(..2 * reach + 1) else { return 0.0 };
+        let mut sum: f64 = first.iter().sum();
+        let mut square = 0.0;
+        for (i, middle) in self.values.iter().enumerate().skip(reach) {
+            square += (middle - sum / (2 * reach + 1) as f64).powi(2);
+            let Some(next) = self.values.get(i + reach + 1) else { break };
+            sum += next - self.values[i - reach];
+        }
+        square
+    }
 }
 
 fn explained(all: &[Samples], hertz: f64) -> f64 {
@@ -88,22 +99,8 @@ fn square(all: &[Samples]) -> f64 {
     all.iter().flat_map(|one| &one.values).map(|x| x * x).sum::<f64>().max(1e-300)
 }
 
-/// Sum of squares of what is about as fast as `hertz` or faster: of what a mean over a period
-/// leaves.
-fn fast(all: &[Samples], hertz: f64) -> f64 {
-    let fast = |one: &Samples| -> f64 {
-        let reach = ((0.5 / hertz / one.step_s).round() as usize).max(1);
-        let Some(first) = one.values.get(..2 * reach + 1) else { return 0.0 };
-        let mut sum: f64 = first.iter().sum();
-        let mut square = 0.0;
-        for (i, middle) in one.values.iter().enumerate().skip(reach) {
-            square += (middle - sum / (2 * reach + 1) as f64).powi(2);
-            let Some(next) = one.values.get(i + reach + 1) else { break };
-            sum += next - one.values[i - reach];
-        }
-        square
-    };
-    all.iter().map(fast).sum()
+fn faster_than(all: &[Samples], hertz: f64) -> f64 {
+    all.iter().map(|one| one.faster_than(hertz)).sum()
 }
 
 /// True if a swing that is `part` of the residual may go its own way, for the axis does not move as
@@ -111,12 +108,12 @@ fn fast(all: &[Samples], hertz: f64) -> f64 {
 fn is_apart(motion: &[Samples], hertz: f64, part: f64) -> bool {
     let room = (1.0 / (1.0 - part)).clamp(1.0, ROOM);
     let (whole, there) = (square(motion), explained(motion, hertz));
-    there < GIVES_WAY * room * whole && fast(motion, hertz) - there < FAST_MOTION * room * whole
+    there < GIVES_WAY * room * whole && faster_than(motion, hertz) - there < FAST_MOTION * room * whole
 }
 
 /// The frequency at which a swing would explain the most of what the refit leaves on the fitted
 /// recordings.
-pub(crate) fn frequency(estimator: &Estimator, fit: &Left) -> Option<f64> {
+pub(crate) fn frequency(estimator: &Estimator, fit: &ResidualView) -> Option<f64> {
     let left = samples(estimator, fit.tracks, fit.refit);
     let apart = apart(&left);
     let first = 2.0 * FEWEST_CYCLES * apart;
@@ -140,7 +137,7 @@ fn nearby(hertz: f64, apart: f64, all: &[Samples]) -> f64 {
 
 /// The swing at about `hertz` as held-out recordings show it; none where the axis itself moves or
 /// is driven so.
-pub(crate) fn swing(estimator: &Estimator, hertz: f64, holdout: &Left) -> Option<TonalDisturbance> {
+pub(crate) fn swing(estimator: &Estimator, hertz: f64, holdout: &ResidualView) -> Option<TonalDisturbance> {
     let of_held = |signals: &[Vec<f64>]| samples(estimator, holdout.tracks, signals);
     let before = of_held(holdout.refit);
     // Each recorder has a clock of its own.
@@ -165,11 +162,11 @@ mod tests {
     fn the_more_swings_the_more_the_axis_may_give_way() {
         let (hertz, step_s) = (12.0, 0.01);
         let motion = |there: f64| {
-            let at = |i: u32| {
+            let swing = |i: u32| {
                 let t = step_s * f64::from(i);
                 (TAU * 0.5 * t).sin() + there.sqrt() * (TAU * hertz * t).sin()
             };
-            [Samples { step_s, values: (0..2000).map(at).collect() }]
+            [Samples { step_s, values: (0..2000).map(swing).collect() }]
         };
         let (still, light, follows) = (motion(0.01), motion(0.1), motion(0.5));
         assert!(is_apart(&still, hertz, 0.3));

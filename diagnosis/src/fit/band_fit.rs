@@ -39,8 +39,8 @@ fn seen(one: &Prepared, track: &BlockedRecording, estimator: &Estimator) -> Prep
         x.iter_mut().zip(&moving).filter(|(_, moving)| !**moving).for_each(|(x, _)| *x = 0.0);
         x
     };
-    let left = |theta: &[f64]| estimator.residual(track, &total(track, &one.columns, theta));
-    let residual = masked(left(&one.reference));
+    let residual_of = |theta: &[f64]| estimator.residual(track, &total(track, &one.columns, theta));
+    let residual = masked(residual_of(&one.reference));
     let response = |column: usize| {
         let mut input = Total::zero(track.block_count());
         track.add_input(&mut input, &one.columns[column].input, 1.0);
@@ -67,11 +67,11 @@ mod tests {
     fn a_fit_in_the_band_knows_nothing_of_faster_motion() {
         let (dt, slow_hz, fast_hz) = (1e-3, 2.0, 60.0);
         let (slow_gain, fast_gain) = (1.0, 2.0);
-        let of = |hz: f64, gain: f64, t: f64| -gain * (TAU * hz * t).sin() / (TAU * hz).powi(2);
+        let swing = |hz: f64, gain: f64, t: f64| -gain * (TAU * hz * t).sin() / (TAU * hz).powi(2);
         let time_s: Vec<f64> = (0..10_000).map(|row| f64::from(row) * dt).collect();
         let command =
             |t: &f64| (TAU * slow_hz * (t + 0.5 * dt)).sin() + (TAU * fast_hz * (t + 0.5 * dt)).sin();
-        let counts = |t: &f64| 1e7 * (of(slow_hz, slow_gain, *t) + of(fast_hz, fast_gain, *t));
+        let counts = |t: &f64| 1e7 * (swing(slow_hz, slow_gain, *t) + swing(fast_hz, fast_gain, *t));
         let recording = Recording {
             command: time_s.iter().map(command).collect(),
             position_counts: time_s.iter().map(counts).map(f64::round).collect(),

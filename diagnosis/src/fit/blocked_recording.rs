@@ -6,7 +6,7 @@ use crate::data::rig::Rig;
 use crate::fit::blocks::{Blocks, Rows};
 use crate::fit::filter::Observed;
 use crate::fit::input::{Input, Total};
-use crate::fit::kept::{BlockMotion, Kept};
+use crate::fit::kept::{BlockMotion, ColumnCache};
 use crate::fit::slices::Slice;
 use std::sync::Arc;
 
@@ -33,7 +33,7 @@ pub(crate) struct BlockedRecording {
     /// Acceleration by the force that is there all the time, of a model fitted before.
     pub(crate) bias: f64,
     /// Its nominal columns as they were under some noises.
-    pub(super) kept: Kept,
+    pub(super) kept: ColumnCache,
 }
 
 impl BlockedRecording {
@@ -71,7 +71,7 @@ impl BlockedRecording {
             unknown: vec![false; n],
             place: None,
             bias: 0.0,
-            kept: Kept::default(),
+            kept: ColumnCache::default(),
         }
     }
 

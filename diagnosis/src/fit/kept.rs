@@ -82,12 +82,12 @@ struct Inputs {
 
 /// The results that one recording keeps.
 #[derive(Debug, Default)]
-pub(crate) struct Kept {
+pub(crate) struct ColumnCache {
     sets: Mutex<Vec<Arc<Whitened>>>,
     inputs: Mutex<Inputs>,
 }
 
-impl Clone for Kept {
+impl Clone for ColumnCache {
     fn clone(&self) -> Self {
         Self { sets: Mutex::new(lock(&self.sets).clone()), inputs: Mutex::new(lock(&self.inputs).clone()) }
     }
@@ -97,7 +97,7 @@ fn lock<T>(of: &Mutex<T>) -> MutexGuard<'_, T> {
     of.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-impl Kept {
+impl ColumnCache {
     /// A set of nominal columns that holds, or else a new one.
     pub(super) fn columns(
         &self,

@@ -9,7 +9,7 @@ use numerics::linear::{Factor, Square};
 
 /// The requirements on a jump and on a recording.
 #[derive(Clone, Copy)]
-pub(crate) struct Asked {
+pub(crate) struct JumpPrior {
     /// Least gain of log-likelihood of a jump.
     gain: f64,
     /// Its least size, counts.
@@ -18,7 +18,7 @@ pub(crate) struct Asked {
     fewest: usize,
 }
 
-impl Asked {
+impl JumpPrior {
     /// Before it is known that counts get lost: more than any jump that noise makes in a recording,
     /// and more than one.
     pub(crate) const UNKNOWN: Self = Self { gain: 14.0, least: 0.7, fewest: 2 };
@@ -29,7 +29,7 @@ impl Asked {
 /// A jump of position must explain this many times what a jump of speed would: impacts are forces.
 const OVER_IMPACT: f64 = 1.3;
 /// Most jumps per recording, and the reach of a response in blocks.
-const MOST: usize = 80;
+const MOST_JUMPS: usize = 80;
 const REACH: usize = 40;
 /// Fewest blocks after a jump that distinguish it from an impact.
 const FEWEST_AFTER: usize = 6;
@@ -62,7 +62,7 @@ pub(crate) fn find(
     track: &BlockedRecording,
     alone: &Fit,
     count: f64,
-    asked: Asked,
+    asked: JumpPrior,
     spread: Option<f64>,
 ) -> Losses {
     let n = track.block_count();
@@ -73,7 +73,7 @@ pub(crate) fn find(
         let before = jumps.len();
         for (j, pair) in peaks(track, gains, &left, asked.gain) {
             let is_new = jumps.iter().all(|jump| jump.block.abs_diff(j) > 1);
-            if jumps.len() < MOST && pair.size().abs() > asked.least * count && is_new {
+            if jumps.len() < MOST_JUMPS && pair.size().abs() > asked.least * count && is_new {
                 jumps.push(Jump::new(track, gains, j, pair.later()));
             }
         }
@@ -106,7 +106,7 @@ const JUST_BEFORE_S: f64 = 0.02;
 const FOLLOWS: f64 = 0.8;
 /// Fewest jumps whose places say something, and standard errors by which they must.
 const TELLING: usize = 6;
-const SURELY: f64 = 3.0;
+const TELLING_Z: f64 = 3.0;
 
 /// True if jumps come just after the command has changed: what is lost is lost whatever the drive
 /// does, what a spring in the drive takes up is not.
@@ -129,7 +129,7 @@ fn follows_command(track: &BlockedRecording, jumps: &[Jump]) -> bool {
     };
     let ranks: f64 = jumps.iter().map(|jump| rank(change(jump.block))).sum::<f64>() / jumps.len() as f64;
     // Ranks that are even between zero and one have a variance of a twelfth.
-    ranks > FOLLOWS && ranks - 0.5 > SURELY / (12.0 * jumps.len() as f64).sqrt()
+    ranks > FOLLOWS && ranks - 0.5 > TELLING_Z / (12.0 * jumps.len() as f64).sqrt()
 }
 
 /// True if jumps come at one angle of the turn: that is a fault of the encoder's scale.

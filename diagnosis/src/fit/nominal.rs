@@ -1,13 +1,14 @@
 //! The nominal model in units of acceleration: its coefficients, their priors, and the sizes that
 //! it allows effects.
 
-use crate::data::rig::Rig;
+use crate::data::rig::{Model, Rig};
 use crate::fit::blocked_recording::BlockedRecording;
 use crate::fit::filter::Noise;
 use crate::fit::skew_columns;
-use crate::laws::definition::{Allowed, NominalTerm};
+use crate::laws::definition::NominalTerm;
 use crate::laws::{EffectName, WholeMachine};
 use numerics::linear::Prior;
+use regression::laws::{Bounds, Quantity};
 
 /// A column's meaning. Coefficients are accelerations: force divided by inertia.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -37,7 +38,7 @@ pub(crate) enum Key {
 
 /// An inertia that fits whose values are shown keep.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Kept {
+pub(crate) enum InertiaSource {
     /// Gain over inertia, seen in the band that the counts support.
     Seen(f64),
     /// The rig's: the recordings show none.
@@ -55,7 +56,7 @@ pub(crate) struct Nominal {
     pub(crate) anchor: Option<(f64, f64)>,
     /// The inertia of fits whose values are shown, where the rig hardly knows it and noise hides it
     /// from the fits of the search.
-    pub(crate) kept_inertia: Option<Kept>,
+    pub(crate) kept_inertia: Option<InertiaSource>,
     /// True if the refit explains most of the force.
     pub(crate) is_balanced: bool,
     /// Inertia added to rig and command alike, where the machine's own hardly matters, kg·m² or kg.
@@ -116,8 +117,8 @@ impl Nominal {
     /// under a speed loop makes it as heavy as it may be.
     pub(crate) fn shown(&self) -> Self {
         let anchor = match self.kept_inertia {
-            Some(Kept::Seen(gain)) => Some((gain, KEPT)),
-            Some(Kept::OfRig) => Some((self.gain(), KEPT)),
+            Some(InertiaSource::Seen(gain)) => Some((gain, KEPT)),
+            Some(InertiaSource::OfRig) => Some((self.gain(), KEPT)),
             None => self.anchor,
         };
         Self { anchor, ..self.clone() }
@@ -220,27 +221,34 @@ impl Nominal {
         }
     }
 
-    /// Returns the bounds of a term's coefficient within which the effect is what its name says.
+    /// Returns the bounds of a term's coefficient, per inertia, within which the effect is what its
+    /// name says.
     pub(crate) fn limits(&self, name: EffectName, term: usize) -> (f64, f64) {
-        let model = &self.rig.model;
-        let most = |held: NominalTerm, value| self.has(held).then(|| self.most_friction(value));
-        let dry = model.coulomb.unwrap_or(0.0) / self.known_inertia();
-        let allowed = Allowed {
-            gain: self.known_gain(),
-            gain_reach: self.gain_reach(),
-            is_anchored: self.anchor.is_some(),
-            viscous: most(NominalTerm::Viscous, model.viscous),
-            dry: most(NominalTerm::Coulomb, model.coulomb),
-            dry_by_uncertainty: most_over_nominal(self.rig.coulomb_sd()) * dry,
-        };
-        name.definition().limits(term, &allowed)
+        let Bounds { low, high, of } = name.bounds_of(term);
+        let unit = self.quantity(of);
+        let (a, b) = unit.map_or((f64::NEG_INFINITY, f64::INFINITY), |unit| (low * unit, high * unit));
+        (a.min(b), a.max(b))
     }
 
-    /// Most that a friction of the rig may be over the inertia: twice what the rig says, any where
-    /// it says zero.
-    fn most_friction(&self, value: Option<f64>) -> f64 {
-        let most = 2.0 * value.unwrap_or(0.0) / self.known_inertia();
-        if most > 0.0 { most } else { f64::INFINITY }
+    /// Returns a quantity in the unit of coefficients, per inertia; `None` if the rig has none, or
+    /// the filter no coefficient in its unit.
+    fn quantity(&self, of: Quantity) -> Option<f64> {
+        let (gain, reach) = (self.known_gain(), self.gain_reach());
+        let Model { viscous, coulomb, .. } = &self.rig.model;
+        let friction = |value: &Option<f64>, factor: f64| {
+            value.filter(|x| *x > 0.0).map(|x| factor * x / self.known_inertia())
+        };
+        match of {
+            Quantity::One | Quantity::Jumps => Some(1.0),
+            Quantity::Shape => None,
+            Quantity::MotorInertia => Some(gain),
+            Quantity::SmallestGain => Some(gain.abs() / reach),
+            Quantity::LargestGain => Some(gain.abs() * reach),
+            Quantity::TrustedGain => Some(gain.abs() * if self.anchor.is_some() { 0.5 } else { reach }),
+            Quantity::TwiceViscous => friction(viscous, 2.0),
+            Quantity::TwiceDry => friction(coulomb, 2.0),
+            Quantity::LargestDry => friction(coulomb, most_over_nominal(self.rig.coulomb_sd())),
+        }
     }
 
     /// Largest part of the command that may do nothing. Where the inertia is hardly known or the
@@ -319,6 +327,13 @@ mod tests {
         let part = 0.9 * known.gain() * known.gain_reach();
         assert!(known.gain_reach() > 1.0);
         near(known.limits(EffectName::TorqueRipple, 0), (-part, part));
+        near(known.limits(EffectName::DriveLoss, 0), (0.0, part));
+        let smallest = known.gain() / known.gain_reach();
+        near(known.limits(EffectName::GainDrift, 0), (-smallest, smallest));
+        // A load's ratio is in terms of the gain with its sign, which may be either.
+        let turned = Nominal { anchor: Some((-20.0, 0.3)), ..known.clone() };
+        near(turned.limits(EffectName::RollerSlip, 0), (-160.0, -6.0));
+        near(turned.limits(EffectName::TorqueRipple, 1), (-9.0, 9.0));
         // Gain over inertia twice the rig's: half the inertia, twice the deceleration.
         let anchored = Nominal { anchor: Some((20.0, 0.3)), ..known };
         near(anchored.limits(asymmetric, 0), (-8.0, 8.0));

@@ -148,8 +148,8 @@ impl Smoothed {
         let columns = [&self.acceleration, &self.velocity, &self.direction, &constant];
         let factors = least_squares(&columns, force)?;
         let mean = force.iter().sum::<f64>() / force.len() as f64;
-        let of = |row: usize| columns.iter().zip(&factors).map(|(column, x)| column[row] * x).sum::<f64>();
-        let left: f64 = force.iter().enumerate().map(|(row, f)| (f - of(row)).powi(2)).sum();
+        let left: f64 =
+            force.iter().enumerate().map(|(row, f)| (f - combined(&columns, &factors, row)).powi(2)).sum();
         let all: f64 = force.iter().map(|f| (f - mean).powi(2)).sum();
         let by_acceleration = factors[0] * factors[0] * self.acceleration.iter().map(|a| a * a).sum::<f64>();
         (all > 0.0 && by_acceleration > 0.3 * all).then(|| (factors[0], 1.0 - left / all))
@@ -174,8 +174,8 @@ impl Smoothed {
         }
         let columns: Vec<&Vec<f64>> = columns.iter().collect();
         let factors = least_squares(&columns, force)?;
-        let of = |row: usize| columns.iter().zip(&factors).map(|(column, x)| column[row] * x).sum::<f64>();
-        let left: Vec<f64> = force.iter().enumerate().map(|(row, f)| f - of(row)).collect();
+        let left: Vec<f64> =
+            force.iter().enumerate().map(|(row, f)| f - combined(&columns, &factors, row)).collect();
         let all = scatter(force);
         let by_acceleration = factors[0] * factors[0] * scatter(columns[0]);
         let is_enough =
@@ -205,6 +205,11 @@ impl Smoothed {
 fn scatter(column: &[f64]) -> f64 {
     let mean = column.iter().sum::<f64>() / column.len() as f64;
     column.iter().map(|x| (x - mean).powi(2)).sum::<f64>()
+}
+
+/// The sum of columns times their factors, in one row.
+fn combined(columns: &[&Vec<f64>], factors: &[f64], row: usize) -> f64 {
+    columns.iter().zip(factors).map(|(column, x)| column[row] * x).sum()
 }
 
 /// The factors of columns whose sum is nearest to `y`; none where a column is zero.

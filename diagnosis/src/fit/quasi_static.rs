@@ -1,10 +1,9 @@
 //! Machines whose inertia hardly matters: slow motion in which the drive works against friction and
 //! load alone.
 //!
-//! With next to nothing on the left side of the equation of motion, setting every term to zero fits
-//! such a recording best. The same inertia added to rig and command alike, `(J + ΔJ)·q̈ = (u +
-//! ΔJ·q̈/gain)·gain − …`, changes no force and gives the left side a size that no refit can take
-//! away. The acceleration is that of the recording, smoothed; nothing here fits.
+//! If J·q̈ ≈ 0, all-zero coefficients fit best, so ΔJ is added to both sides: `(J + ΔJ)·q̈ = (u +
+//! ΔJ·q̈/gain)·gain − …`. That changes no force, and no refit can take it away. The acceleration is
+//! that of the recording, smoothed; nothing here fits.
 
 use crate::fit::blocked_recording::BlockedRecording;
 use crate::fit::force_residual::Estimator;

@@ -1,16 +1,15 @@
 //! The inertia that recordings show where the rig hardly knows it.
 //!
-//! A regression of the motion on the command takes an axis under a speed loop for too heavy to be
-//! moved: whatever of the command moves nothing makes it heavier. A regression of the command on
-//! the motion has no such way out. Errors of the motion make the inertia that it finds too small,
-//! so that one that is next to nothing, or negative, is hidden by noise, and not small.
+//! Regressing motion on command overestimates the inertia under a speed loop, so this regresses the
+//! command on the motion. Errors of the motion bias that inertia low: one near zero, or negative,
+//! is hidden by noise, and not small.
 
 use crate::fit::blocked_recording::BlockedRecording;
 use crate::fit::filter::Noise;
 use crate::fit::force_residual::Estimator;
 use crate::fit::linear_fit::Fit;
 use crate::fit::model::Model;
-use crate::fit::nominal::{Kept, Nominal};
+use crate::fit::nominal::{InertiaSource, Nominal};
 use numerics::linear::{Prior, Square, bounded};
 
 /// Factor by which a gain over inertia that is hardly known may differ from the rig's.
@@ -29,8 +28,8 @@ pub(crate) fn anchor(nominal: &mut Nominal, tracks: &[BlockedRecording], white: 
     let kept = (inertia == Inertia::Hidden).then(|| {
         let in_band = fit(&Estimator::new(tracks, white, scale).weighing(tracks, white));
         match in_band.inertia(nominal.gain()) {
-            Inertia::Found(gain) if in_band.prefers_its_own(nominal.gain()) => Kept::Seen(gain),
-            _ => Kept::OfRig,
+            Inertia::Found(gain) if in_band.prefers_its_own(nominal.gain()) => InertiaSource::Seen(gain),
+            _ => InertiaSource::OfRig,
         }
     });
     nominal.kept_inertia = kept;

@@ -101,13 +101,13 @@ fn takes_most(
 ) -> bool {
     let estimator = Estimator::new(tracks, noise, scale);
     let count = 1.0 / nominal.rig.encoder.counts_per_unit;
-    let left = |fit: &Fit, tracks: &[BlockedRecording]| {
+    let power_left = |fit: &Fit, tracks: &[BlockedRecording]| {
         let totals = fit.totals(tracks);
         let residuals: Vec<Vec<f64>> =
             tracks.iter().zip(&totals).map(|(track, total)| estimator.residual(track, total)).collect();
         estimator.rms(&residuals, tracks).powi(2) - estimator.counting(tracks, noise, count).powi(2)
     };
-    left(&skew.fit, &skew.tracks) < MOST_LEFT * left(without, tracks)
+    power_left(&skew.fit, &skew.tracks) < MOST_LEFT * power_left(without, tracks)
 }
 
 /// Finds the skew of recordings under the nominal model and delays their commands by it. Nothing

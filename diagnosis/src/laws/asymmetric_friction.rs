@@ -3,7 +3,7 @@
 //! part can be identified.
 
 use super::definition::{
-    Allowed, EffectLaw, EffectReport, EffectSearch, FREE, Fitted, ForceLaw, Plain, Reported, Span,
+    EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Plain, Reported, Span,
 };
 use super::joint_terms::JointTerms;
 use super::law::{first_or_both, sign};
@@ -38,9 +38,9 @@ shape! {
     }
 }
 
-pub(super) struct Defined;
+pub(super) struct AsymmetricFriction;
 
-impl EffectLaw for Defined {
+impl EffectLaw for AsymmetricFriction {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         Some(Box::new(AsymmetricFrictionLaw { viscous_only: Shape::of(effect).viscous_only }))
     }
@@ -72,7 +72,7 @@ impl EffectLaw for Defined {
     }
 }
 
-impl EffectSearch for Defined {
+impl EffectSearch for AsymmetricFriction {
     fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
         // Any friction is one that differs with direction where there is one direction.
         if span.one_way {
@@ -80,10 +80,6 @@ impl EffectSearch for Defined {
         }
         let known = [("viscous_only", 1.0)];
         vec![Effect::shaped(name, if span.rig.has_offset { &known } else { &[] })]
-    }
-    fn limits(&self, term: usize, allowed: &Allowed) -> (f64, f64) {
-        let most = if term == 0 { allowed.viscous } else { allowed.dry };
-        most.map_or(FREE, |most| (-most, most))
     }
     fn freedom(&self, _effect: &Effect, _recordings: usize) -> usize {
         2
@@ -93,7 +89,7 @@ impl EffectSearch for Defined {
     }
 }
 
-impl EffectReport for Defined {
+impl EffectReport for AsymmetricFriction {
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         let mut out = Vec::new();
         let mut put = |name: &str, term: (f64, f64), friction: f64| {

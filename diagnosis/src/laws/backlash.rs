@@ -1,7 +1,7 @@
 //! A gap between motor and load that opens at reversals; the law is in `load`.
 
 use super::definition::{
-    Allowed, Coupling, EffectLaw, EffectReport, EffectSearch, Factors, Fitted, ForceLaw, Movable, Reported, Span,
+    Coupling, EffectLaw, EffectReport, EffectSearch, Factors, Fitted, ForceLaw, Movable, Reported, Span,
 };
 use super::joint_terms::JointTerms;
 use super::load::{Load, MOST_OF_DRY, Machine, RATIOS, gap_of, own_friction};
@@ -42,9 +42,9 @@ shape! {
     }
 }
 
-pub(super) struct Defined;
+pub(super) struct Backlash;
 
-impl EffectLaw for Defined {
+impl EffectLaw for Backlash {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         let Shape { gap, contact_hz } = Shape::of(effect);
         Some(Box::new(BacklashLaw(Load::behind_gap(effect, gap, contact_hz))))
@@ -62,7 +62,7 @@ impl EffectLaw for Defined {
     }
 }
 
-impl EffectSearch for Defined {
+impl EffectSearch for Backlash {
     fn is_unseen(&self, effect: &Effect, count: f64) -> bool {
         Shape::of(effect).gap < SEEN * count
     }
@@ -91,16 +91,12 @@ impl EffectSearch for Defined {
     fn is_possible(&self, effect: &Effect) -> bool {
         own_friction(effect) <= MOST_OF_DRY * Machine::of(effect).dry
     }
-    fn limits(&self, _term: usize, allowed: &Allowed) -> (f64, f64) {
-        let gain = allowed.gain;
-        ((8.0 * gain).min(0.1 * gain), (8.0 * gain).max(0.1 * gain))
-    }
     fn start_factors(&self) -> &'static [Factors] {
         &[("gap", &[0.6, 1.0, 1.6]), ("coast", &[0.5, 1.0, 1.7]), ("ratio", &[0.6, 1.0, 1.7])]
     }
 }
 
-impl EffectReport for Defined {
+impl EffectReport for Backlash {
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         vec![Reported::new("gap", fitted.shape("gap"), fitted.length)]
     }

@@ -88,13 +88,13 @@ mod tests {
     #[test]
     fn spread_bristles_slide_one_after_another_until_all_do() {
         let spread = [("deflection", 1.0), ("spread", 100.0)];
-        let at = |travel: f64| bent_after(&mut bristles(&spread), travel);
+        let bend = |travel: f64| bent_after(&mut bristles(&spread), travel);
         // Lengths of 0.1 to 10: at 0.1 the shortest slides, the others are bent by 0.1 of their
         // lengths' inverse.
         let lengths = lengths(&Effect::shaped(EffectName::PreslidingFriction, &spread));
         let expected = lengths.iter().map(|length| (0.1 / length).min(1.0)).sum::<f64>() / 6.0;
-        assert!((at(0.1) - expected).abs() < 1e-3, "{} instead of {expected}", at(0.1));
-        assert!(at(5.0) < 0.95 && at(10.5) == 1.0);
+        assert!((bend(0.1) - expected).abs() < 1e-3, "{} instead of {expected}", bend(0.1));
+        assert!(bend(5.0) < 0.95 && bend(10.5) == 1.0);
     }
 
     #[test]

@@ -7,9 +7,9 @@ use super::shape::ShapeKey;
 use super::waves::{self, Waves};
 use super::{Effect, EffectName, Variable};
 
-pub(super) struct Defined;
+pub(super) struct Cogging;
 
-impl EffectLaw for Defined {
+impl EffectLaw for Cogging {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         Some(Box::new(Waves::new(effect, false)))
     }
@@ -31,7 +31,7 @@ impl EffectLaw for Defined {
     }
 }
 
-impl EffectSearch for Defined {
+impl EffectSearch for Cogging {
     fn is_periodic(&self) -> bool {
         true
     }
@@ -47,7 +47,7 @@ impl EffectSearch for Defined {
     }
 }
 
-impl EffectReport for Defined {
+impl EffectReport for Cogging {
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         waves::report(fitted, false)
     }

@@ -7,8 +7,7 @@ use std::collections::VecDeque;
 /// over its step.
 #[derive(Debug, Clone)]
 pub(crate) enum CommandLaw {
-    /// Small commands do nothing; `shift` takes the width off larger ones, otherwise they pass
-    /// whole.
+    /// u′ = 0 for |u| ≤ `half_width`; otherwise u, or with `shift` u − half_width·sgn u.
     Deadband { half_width: f64, shift: bool },
     /// Commands beyond the limit are held at it. With `softness` s > 0 they approach it:
     /// `u/(1 + |u/limit|^(1/s))^s`.

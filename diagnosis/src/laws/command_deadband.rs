@@ -1,4 +1,4 @@
-//! Small commands do nothing; larger ones pass whole or lose the width.
+//! Deadband of width w: u′ = 0 for |u| ≤ w; otherwise u′ = u, or u − w·sgn u.
 
 use super::definition::{EffectLaw, EffectReport, EffectSearch, Fitted, Movable, Reported, Span};
 use super::shape::{ShapeKey, shape};
@@ -15,9 +15,9 @@ shape! {
     }
 }
 
-pub(super) struct Defined;
+pub(super) struct CommandDeadband;
 
-impl EffectLaw for Defined {
+impl EffectLaw for CommandDeadband {
     fn command_law(&self, effect: &Effect) -> Option<CommandLaw> {
         let Shape { half_width, shift } = Shape::of(effect);
         Some(CommandLaw::Deadband { half_width, shift })
@@ -30,17 +30,17 @@ impl EffectLaw for Defined {
     }
 }
 
-impl EffectSearch for Defined {
+impl EffectSearch for CommandDeadband {
     fn has_optima_apart(&self) -> bool {
         true
     }
     fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
-        let at = |shift: f64| {
+        let bands = |shift: f64| {
             logarithmic(0.01 * span.command, 0.85 * span.dead, 11)
                 .into_iter()
                 .map(move |width| Effect::shaped(name, &[("half_width", width), ("shift", shift)]))
         };
-        at(0.0).chain(at(1.0)).collect()
+        bands(0.0).chain(bands(1.0)).collect()
     }
     fn movable(&self, _effect: &Effect, span: &Span) -> Vec<Movable> {
         vec![("half_width", 0.001 * span.command, span.dead)]
@@ -50,7 +50,7 @@ impl EffectSearch for Defined {
     }
 }
 
-impl EffectReport for Defined {
+impl EffectReport for CommandDeadband {
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         vec![Reported::new("half_width", fitted.shape("half_width"), fitted.command.clone())]
     }

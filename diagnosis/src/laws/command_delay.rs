@@ -19,9 +19,9 @@ shape! {
     }
 }
 
-pub(super) struct Defined;
+pub(super) struct CommandDelay;
 
-impl EffectLaw for Defined {
+impl EffectLaw for CommandDelay {
     fn command_law(&self, effect: &Effect) -> Option<CommandLaw> {
         Some(CommandLaw::of_delay(Shape::of(effect).delay))
     }
@@ -34,7 +34,7 @@ impl EffectLaw for Defined {
     }
 }
 
-impl EffectSearch for Defined {
+impl EffectSearch for CommandDelay {
     fn has_optima_apart(&self) -> bool {
         true
     }
@@ -50,7 +50,7 @@ impl EffectSearch for Defined {
     }
 }
 
-impl EffectReport for Defined {
+impl EffectReport for CommandDelay {
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         vec![Reported::new("delay", fitted.shape("delay"), "s")]
     }

@@ -20,9 +20,9 @@ shape! {
 /// The softness from which a search starts.
 const SOFTNESS: f64 = 0.1;
 
-pub(super) struct Defined;
+pub(super) struct CommandSaturation;
 
-impl EffectLaw for Defined {
+impl EffectLaw for CommandSaturation {
     fn command_law(&self, effect: &Effect) -> Option<CommandLaw> {
         let Shape { limit, softness } = Shape::of(effect);
         Some(CommandLaw::Clip { limit, softness })
@@ -40,7 +40,7 @@ impl EffectLaw for Defined {
     }
 }
 
-impl EffectSearch for Defined {
+impl EffectSearch for CommandSaturation {
     fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
         let limits: Vec<f64> = logarithmic(span.clip * span.command, 0.945 * span.command, 10);
         let hard = limits.iter().map(|&limit| Effect::shaped(name, &[("limit", limit)]));
@@ -57,7 +57,7 @@ impl EffectSearch for Defined {
     }
 }
 
-impl EffectReport for Defined {
+impl EffectReport for CommandSaturation {
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         let limit = Reported::new("limit", fitted.shape("limit"), fitted.command.clone());
         let is_soft = Shape::of(fitted.effect).softness > 0.0;

@@ -1,7 +1,7 @@
 //! Dry friction, where the nominal model has none: `-coulomb·sgn(q̇)`.
 
 use super::definition::{
-    Allowed, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, NominalTerm, POSITIVE, Plain, Reported, Span,
+    EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, NominalTerm, Plain, Reported, Span,
 };
 use super::joint_terms::JointTerms;
 use super::law::sign;
@@ -22,9 +22,9 @@ impl ForceLaw for CoulombFrictionLaw {
     }
 }
 
-pub(super) struct Defined;
+pub(super) struct CoulombFriction;
 
-impl EffectLaw for Defined {
+impl EffectLaw for CoulombFriction {
     fn law(&self, _effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         Some(Box::new(CoulombFrictionLaw))
     }
@@ -43,19 +43,16 @@ impl EffectLaw for Defined {
     }
 }
 
-impl EffectSearch for Defined {
+impl EffectSearch for CoulombFriction {
     fn grid(&self, name: EffectName, _span: &Span) -> Vec<Effect> {
         vec![Effect::shaped(name, &[])]
-    }
-    fn limits(&self, _term: usize, _allowed: &Allowed) -> (f64, f64) {
-        POSITIVE
     }
     fn plain(&self, _effect: &Effect) -> Option<Plain> {
         Some(Plain { rank: 0, has_twin: false })
     }
 }
 
-impl EffectReport for Defined {
+impl EffectReport for CoulombFriction {
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         fitted.one_force("coulomb", fitted.force.into())
     }

@@ -1,7 +1,7 @@
 //! A spring between motor and load, seen as a resonance: what a rigid model misses of two masses.
 
 use super::definition::{
-    Allowed, Coupling, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Movable, Reported,
+    Coupling, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Movable, Reported,
     Span,
 };
 use super::shape::{ShapeKey, shape};
@@ -73,9 +73,9 @@ shape! {
     }
 }
 
-pub(super) struct Defined;
+pub(super) struct DriveCompliance;
 
-impl EffectLaw for Defined {
+impl EffectLaw for DriveCompliance {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         let Shape { resonance_hz, damping } = Shape::of(effect);
         Some(Box::new(DriveComplianceLaw { omega: TAU * resonance_hz, damping, state: None }))
@@ -91,7 +91,7 @@ impl EffectLaw for Defined {
     }
 }
 
-impl EffectSearch for Defined {
+impl EffectSearch for DriveCompliance {
     fn has_optima_apart(&self) -> bool {
         true
     }
@@ -107,13 +107,9 @@ impl EffectSearch for Defined {
     fn movable(&self, _effect: &Effect, span: &Span) -> Vec<Movable> {
         vec![("resonance_hz", 4.0, highest(span)), ("damping", 0.003, 0.7)]
     }
-    fn limits(&self, _term: usize, allowed: &Allowed) -> (f64, f64) {
-        let gain = allowed.gain;
-        ((6.0 * gain).min(0.0), (6.0 * gain).max(0.0))
-    }
 }
 
-impl EffectReport for Defined {
+impl EffectReport for DriveCompliance {
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         let (f, s) = fitted.shape("resonance_hz");
         let (x, sd) = fitted.term(0);

@@ -1,7 +1,7 @@
 //! A loss in proportion to the drive's own force, as a gear or a screw has:
 //! `-fraction·|drive|·sgn(q̇)`.
 
-use super::definition::{Allowed, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Reported, Span};
+use super::definition::{EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Reported, Span};
 use super::law::sign;
 use super::{Effect, EffectName, State};
 
@@ -20,9 +20,9 @@ impl ForceLaw for DriveLossLaw {
     }
 }
 
-pub(super) struct Defined;
+pub(super) struct DriveLoss;
 
-impl EffectLaw for Defined {
+impl EffectLaw for DriveLoss {
     fn law(&self, _effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         Some(Box::new(DriveLossLaw))
     }
@@ -37,17 +37,13 @@ impl EffectLaw for Defined {
     }
 }
 
-impl EffectSearch for Defined {
+impl EffectSearch for DriveLoss {
     fn grid(&self, name: EffectName, _span: &Span) -> Vec<Effect> {
         vec![Effect::shaped(name, &[])]
     }
-    fn limits(&self, _term: usize, allowed: &Allowed) -> (f64, f64) {
-        // A drive that loses more does not move its axis.
-        (0.0, 0.9 * allowed.gain.abs() * allowed.gain_reach)
-    }
 }
 
-impl EffectReport for Defined {
+impl EffectReport for DriveLoss {
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         let (loss, sd) = fitted.term(0);
         let ratio = fitted.ratio.abs();

@@ -14,9 +14,9 @@ shape! {
     }
 }
 
-pub(super) struct Defined;
+pub(super) struct ElectricalLag;
 
-impl EffectLaw for Defined {
+impl EffectLaw for ElectricalLag {
     fn command_law(&self, effect: &Effect) -> Option<CommandLaw> {
         Some(CommandLaw::of_lag(Shape::of(effect).time_constant))
     }
@@ -29,7 +29,7 @@ impl EffectLaw for Defined {
     }
 }
 
-impl EffectSearch for Defined {
+impl EffectSearch for ElectricalLag {
     fn has_optima_apart(&self) -> bool {
         true
     }
@@ -45,7 +45,7 @@ impl EffectSearch for Defined {
     }
 }
 
-impl EffectReport for Defined {
+impl EffectReport for ElectricalLag {
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         vec![Reported::new("time_constant", fitted.shape("time_constant"), "s")]
     }

@@ -6,9 +6,9 @@ use super::shape::ShapeKey;
 use super::waves::{self, Waves};
 use super::{Effect, EffectName};
 
-pub(super) struct Defined;
+pub(super) struct EncoderEccentricity;
 
-impl EffectLaw for Defined {
+impl EffectLaw for EncoderEccentricity {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         Some(Box::new(Waves::new(effect, false)))
     }
@@ -23,7 +23,7 @@ impl EffectLaw for Defined {
     }
 }
 
-impl EffectSearch for Defined {
+impl EffectSearch for EncoderEccentricity {
     fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
         let turn = span.rig.turn.filter(|turn| span.travel() / turn > LEAST_TURNS);
         turn.into_iter().map(|turn| once_a_turn(name, turn)).collect()
@@ -33,7 +33,7 @@ impl EffectSearch for Defined {
     }
 }
 
-impl EffectReport for Defined {
+impl EffectReport for EncoderEccentricity {
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         vec![Reported::new("amplitude", waves::amplitude(fitted), fitted.length)]
     }

@@ -2,7 +2,7 @@
 //! viscous·q̇)·(1 - exp(-t/time_constant))`.
 
 use super::definition::{
-    Allowed, EffectLaw, EffectReport, EffectSearch, FREE, Fitted, ForceLaw, Movable, Reported, Span,
+    EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Movable, Reported, Span,
 };
 use super::law::{first_or_both, sign};
 use super::shape::{ShapeKey, shape};
@@ -38,9 +38,9 @@ impl ForceLaw for FrictionDriftLaw {
     }
 }
 
-pub(super) struct Defined;
+pub(super) struct FrictionDrift;
 
-impl EffectLaw for Defined {
+impl EffectLaw for FrictionDrift {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         Some(Box::new(FrictionDriftLaw(Shape::of(effect))))
     }
@@ -55,39 +55,29 @@ impl EffectLaw for Defined {
     }
 }
 
-impl EffectSearch for Defined {
+impl EffectSearch for FrictionDrift {
     fn has_optima_apart(&self) -> bool {
         true
     }
     fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
-        let at = |time_constant: f64| {
+        let settling_in = |time_constant: f64| {
             let mut drift = Effect::shaped(name, &[("time_constant", time_constant)]);
             if !span.rig.has_viscous {
                 drift.shape.insert("dry_only".into(), 1.0);
             }
             drift
         };
-        logarithmic(0.08 * span.duration, 2.0 * span.duration, 5).into_iter().map(at).collect()
+        logarithmic(0.08 * span.duration, 2.0 * span.duration, 5).into_iter().map(settling_in).collect()
     }
     fn movable(&self, _effect: &Effect, span: &Span) -> Vec<Movable> {
         vec![("time_constant", 0.02 * span.duration, 5.0 * span.duration)]
-    }
-    fn limits(&self, term: usize, allowed: &Allowed) -> (f64, f64) {
-        // What warms changes both frictions alike; how much of the friction as it is may go or come
-        // is judged where that is known.
-        let most = match (term, allowed.viscous, allowed.dry) {
-            (1.., Some(viscous), _) => viscous,
-            (_, _, Some(_)) => allowed.dry_by_uncertainty,
-            _ => return FREE,
-        };
-        (-0.9 * most, 3.0 * most)
     }
     fn freedom(&self, _effect: &Effect, _recordings: usize) -> usize {
         2
     }
 }
 
-impl EffectReport for Defined {
+impl EffectReport for FrictionDrift {
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         let (change, sd) = fitted.term(0);
         let base = if fitted.own_dry == 0.0 { fitted.dry.unwrap_or(0.0) } else { fitted.own_dry }.abs();

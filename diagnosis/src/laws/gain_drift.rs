@@ -6,7 +6,7 @@
 //! speaks only against others.
 
 use super::definition::{
-    Allowed, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Movable, Reported, Span, Unnamed,
+    EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Movable, Reported, Span, Unnamed,
 };
 use super::shape::{ShapeKey, shape};
 use super::{Effect, EffectName, State, experiments};
@@ -64,9 +64,9 @@ impl ForceLaw for GainDriftLaw {
 /// Times, as parts of the longest recording, at which a load may change at once.
 const CHANGES: usize = 40;
 
-pub(super) struct Defined;
+pub(super) struct GainDrift;
 
-impl EffectLaw for Defined {
+impl EffectLaw for GainDrift {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         Some(Box::new(GainDriftLaw { shape: Shape::of(effect), heat: 0.0 }))
     }
@@ -84,7 +84,7 @@ impl EffectLaw for Defined {
     }
 }
 
-impl EffectSearch for Defined {
+impl EffectSearch for GainDrift {
     fn has_optima_apart(&self) -> bool {
         true
     }
@@ -104,25 +104,20 @@ impl EffectSearch for Defined {
     fn movable(&self, _effect: &Effect, span: &Span) -> Vec<Movable> {
         vec![("time_constant", 0.02 * span.duration, 5.0 * span.duration)]
     }
-    fn limits(&self, _term: usize, allowed: &Allowed) -> (f64, f64) {
-        // The gain keeps its sign, whatever gain the rig allows: the smallest bounds its drift.
-        let smallest = allowed.gain.abs() / allowed.gain_reach;
-        (-smallest, smallest)
-    }
     fn unnamed(&self, name: EffectName, fitted: Option<&Effect>, span: &Span) -> Vec<Unnamed> {
         if fitted.is_some_and(|effect| effect.name != name) {
             return Vec::new();
         }
-        let at = |i: usize| {
+        let sudden_load = |i: usize| {
             let time = span.duration * i as f64 / CHANGES as f64;
             let effect = Effect::shaped(name, &[("time_constant", span.duration), ("at_once_s", time)]);
             Unnamed { effect, freedom: 4.0, what: format!("a load that changes at once, at {time:.1} s,") }
         };
-        (1..CHANGES).map(at).collect()
+        (1..CHANGES).map(sudden_load).collect()
     }
 }
 
-impl EffectReport for Defined {
+impl EffectReport for GainDrift {
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         let (change, sd) = fitted.term(0);
         vec![

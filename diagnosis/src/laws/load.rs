@@ -1,5 +1,4 @@
-//! The part of the machine beyond a gap or a grip: a second mass that is seen only by what the
-//! motor feels of it.
+//! Two-mass model: a load behind backlash or a slipping grip, seen only by its force on the motor.
 //!
 //! With J = Jm + Jl, p = Jl/J and r = Jl/Jm, a rigid machine accelerates by d − f, where d = D/J
 //! and f = F/J against the motion. A load that brakes itself by a, reached through a force T, adds

@@ -1,7 +1,7 @@
 //! Dry friction that grows with the measured external load: `-coefficient·|force|·sgn(q̇)`.
 
 use super::definition::{
-    Allowed, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, POSITIVE, Reported, Span,
+    EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Reported, Span,
 };
 use super::law::sign;
 use super::{Effect, EffectName, State};
@@ -21,9 +21,9 @@ impl ForceLaw for LoadDependentFrictionLaw {
     }
 }
 
-pub(super) struct Defined;
+pub(super) struct LoadDependentFriction;
 
-impl EffectLaw for Defined {
+impl EffectLaw for LoadDependentFriction {
     fn law(&self, _effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         Some(Box::new(LoadDependentFrictionLaw))
     }
@@ -32,16 +32,13 @@ impl EffectLaw for Defined {
     }
 }
 
-impl EffectSearch for Defined {
+impl EffectSearch for LoadDependentFriction {
     fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
         if span.force { vec![Effect::shaped(name, &[])] } else { Vec::new() }
     }
-    fn limits(&self, _term: usize, _allowed: &Allowed) -> (f64, f64) {
-        POSITIVE
-    }
 }
 
-impl EffectReport for Defined {
+impl EffectReport for LoadDependentFriction {
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         fitted.one_force("coefficient", "1".into())
     }

@@ -16,9 +16,9 @@ pub(super) fn once_a_turn(name: EffectName, turn: f64) -> Effect {
     Effect::shaped(name, &[("turn", turn), ("order_1", 1.0)])
 }
 
-pub(super) struct Defined;
+pub(super) struct MassImbalance;
 
-impl EffectLaw for Defined {
+impl EffectLaw for MassImbalance {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         Some(Box::new(Waves::new(effect, false)))
     }
@@ -36,7 +36,7 @@ impl EffectLaw for Defined {
     }
 }
 
-impl EffectSearch for Defined {
+impl EffectSearch for MassImbalance {
     fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
         if span.rig.has_gravity {
             // It is the gravity of that very mass.
@@ -56,7 +56,7 @@ impl EffectSearch for Defined {
     }
 }
 
-impl EffectReport for Defined {
+impl EffectReport for MassImbalance {
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         vec![Reported::new("amplitude", fitted.scaled(waves::amplitude(fitted)), fitted.force)]
     }

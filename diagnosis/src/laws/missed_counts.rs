@@ -1,7 +1,7 @@
 //! Counts that the encoder loses permanently: steps of what it reads. The steps are found before
 //! any effect is.
 
-use super::definition::{Allowed, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Reported, Span};
+use super::definition::{EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Reported, Span};
 use super::shape::{Missing, ShapeKey};
 use super::{Effect, EffectName, State};
 
@@ -25,9 +25,9 @@ impl ForceLaw for MissedCountsLaw {
     }
 }
 
-pub(super) struct Defined;
+pub(super) struct MissedCounts;
 
-impl EffectLaw for Defined {
+impl EffectLaw for MissedCounts {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         let steps = effect.shape.iter().filter_map(|(key, time)| Some((key.strip_prefix("time_")?, *time)));
         let (names, times) = steps.map(|(n, time)| (format!("step_{n}"), time)).unzip();
@@ -51,16 +51,13 @@ impl EffectLaw for Defined {
     }
 }
 
-impl EffectSearch for Defined {
+impl EffectSearch for MissedCounts {
     fn grid(&self, name: EffectName, _span: &Span) -> Vec<Effect> {
         vec![Effect::shaped(name, &[])]
     }
-    fn limits(&self, _term: usize, _allowed: &Allowed) -> (f64, f64) {
-        (0.5, 1.5)
-    }
 }
 
-impl EffectReport for Defined {
+impl EffectReport for MissedCounts {
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         // All the counts that were lost in the fitted recordings, whichever way.
         let sum = fitted.lost * fitted.term(0).0;

@@ -59,7 +59,7 @@ macro_rules! registry {
 
             /// Returns its definition.
             pub(crate) fn definition(self) -> &'static dyn Definition {
-                match self { $(Self::$variant => &$module::Defined,)* Self::Formula(id) => id.get() }
+                match self { $(Self::$variant => &$module::$variant,)* Self::Formula(id) => id.get() }
             }
         }
     };

@@ -56,9 +56,9 @@ shape! {
     }
 }
 
-pub(super) struct Defined;
+pub(super) struct PositionDependentDamping;
 
-impl EffectLaw for Defined {
+impl EffectLaw for PositionDependentDamping {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         Some(Box::new(PositionDependentDampingLaw {
             profile: Profile::new(effect),
@@ -73,7 +73,7 @@ impl EffectLaw for Defined {
     }
 }
 
-impl EffectSearch for Defined {
+impl EffectSearch for PositionDependentDamping {
     fn profile_values(&self, effect: &Effect) -> f64 {
         travel_profile::degree(effect)
     }
@@ -98,7 +98,7 @@ impl EffectSearch for Defined {
     }
 }
 
-impl EffectReport for Defined {
+impl EffectReport for PositionDependentDamping {
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         let unit = format!("{}·s/{}", fitted.force, fitted.length);
         vec![Reported::new("span", travel_profile::span(fitted), unit)]

@@ -21,9 +21,9 @@ impl ForceLaw for PositionDependentFrictionLaw {
     }
 }
 
-pub(super) struct Defined;
+pub(super) struct PositionDependentFriction;
 
-impl EffectLaw for Defined {
+impl EffectLaw for PositionDependentFriction {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         Some(Box::new(PositionDependentFrictionLaw(Profile::new(effect))))
     }
@@ -38,7 +38,7 @@ impl EffectLaw for Defined {
     }
 }
 
-impl EffectSearch for Defined {
+impl EffectSearch for PositionDependentFriction {
     fn profile_values(&self, effect: &Effect) -> f64 {
         travel_profile::degree(effect)
     }
@@ -50,7 +50,7 @@ impl EffectSearch for Defined {
     }
 }
 
-impl EffectReport for Defined {
+impl EffectReport for PositionDependentFriction {
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         vec![Reported::new("span", travel_profile::span(fitted), fitted.force)]
     }

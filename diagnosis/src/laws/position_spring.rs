@@ -2,7 +2,7 @@
 //! beyond `from`; with `fades_s` it creeps, which has no name and speaks only against others.
 
 use super::definition::{
-    Allowed, EffectLaw, EffectReport, EffectSearch, FREE, Fitted, ForceLaw, Movable, POSITIVE, Plain,
+    EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Movable, Plain,
     Reported, Span, Unnamed,
 };
 use super::joint_terms::JointTerms;
@@ -54,9 +54,9 @@ impl ForceLaw for PositionSpringLaw {
 /// Times in which the force of a spring that creeps may fade, s.
 const FADES_S: [f64; 6] = [0.1, 0.25, 0.6, 1.5, 4.0, 10.0];
 
-pub(super) struct Defined;
+pub(super) struct PositionSpring;
 
-impl EffectLaw for Defined {
+impl EffectLaw for PositionSpring {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         Some(Box::new(PositionSpringLaw { shape: Shape::of(effect), faded: 0.0 }))
     }
@@ -78,7 +78,7 @@ impl EffectLaw for Defined {
     }
 }
 
-impl EffectSearch for Defined {
+impl EffectSearch for PositionSpring {
     fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
         // A rig without an offset has no other term for a spring that is not at rest where the
         // recording starts. Where the inertia is hardly known one more term explains slow motion as
@@ -98,9 +98,6 @@ impl EffectSearch for Defined {
     }
     fn movable(&self, _effect: &Effect, _span: &Span) -> Vec<Movable> {
         Vec::new()
-    }
-    fn limits(&self, term: usize, _allowed: &Allowed) -> (f64, f64) {
-        if term > 0 { FREE } else { POSITIVE }
     }
     fn freedom(&self, effect: &Effect, _recordings: usize) -> usize {
         1 + usize::from(Shape::of(effect).preload)
@@ -124,7 +121,7 @@ impl EffectSearch for Defined {
     }
 }
 
-impl EffectReport for Defined {
+impl EffectReport for PositionSpring {
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         fitted.one_force("stiffness", format!("{}/{}", fitted.force, fitted.length))
     }

@@ -3,7 +3,7 @@
 
 use super::bristles::{Bristles, Shape, lengths};
 use super::definition::{
-    Allowed, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Movable, POSITIVE, Reported,
+    EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Movable, Reported,
     Span,
 };
 use super::joint_terms::{self, JointTerms};
@@ -40,9 +40,9 @@ impl ForceLaw for PreslidingFrictionLaw {
     }
 }
 
-pub(super) struct Defined;
+pub(super) struct PreslidingFriction;
 
-impl EffectLaw for Defined {
+impl EffectLaw for PreslidingFriction {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         Some(Box::new(PreslidingFrictionLaw {
             bristles: Bristles::new(effect),
@@ -65,20 +65,17 @@ impl EffectLaw for Defined {
     }
 }
 
-impl EffectSearch for Defined {
+impl EffectSearch for PreslidingFriction {
     fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
-        let at = |spread: f64| {
+        let bristles = |spread: f64| {
             logarithmic(2.0 * span.count, 0.03 * span.travel(), 9).into_iter().map(move |deflection| {
                 Effect::shaped(name, &[("deflection", deflection), ("spread", spread)])
             })
         };
-        at(1.0).chain(at(SPREAD)).collect()
+        bristles(1.0).chain(bristles(SPREAD)).collect()
     }
     fn movable(&self, _effect: &Effect, span: &Span) -> Vec<Movable> {
         vec![("deflection", 0.5 * span.count, 0.1 * span.travel())]
-    }
-    fn limits(&self, _term: usize, _allowed: &Allowed) -> (f64, f64) {
-        POSITIVE
     }
     fn bends_at_reversals(&self) -> bool {
         true
@@ -92,7 +89,7 @@ impl EffectSearch for Defined {
     }
 }
 
-impl EffectReport for Defined {
+impl EffectReport for PreslidingFriction {
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         let (c, cs) = fitted.scaled(fitted.term(0));
         let (d, ds) = fitted.shape("deflection");

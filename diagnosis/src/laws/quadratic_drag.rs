@@ -1,7 +1,7 @@
 //! Drag with the square of speed: `-coefficient·q̇·|q̇|`.
 
 use super::definition::{
-    Allowed, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, POSITIVE, Reported, Span,
+    EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Reported, Span,
 };
 use super::{Effect, EffectName, State, Variable};
 
@@ -20,9 +20,9 @@ impl ForceLaw for QuadraticDragLaw {
     }
 }
 
-pub(super) struct Defined;
+pub(super) struct QuadraticDrag;
 
-impl EffectLaw for Defined {
+impl EffectLaw for QuadraticDrag {
     fn law(&self, _effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         Some(Box::new(QuadraticDragLaw))
     }
@@ -31,16 +31,13 @@ impl EffectLaw for Defined {
     }
 }
 
-impl EffectSearch for Defined {
+impl EffectSearch for QuadraticDrag {
     fn grid(&self, name: EffectName, _span: &Span) -> Vec<Effect> {
         vec![Effect::shaped(name, &[])]
     }
-    fn limits(&self, _term: usize, _allowed: &Allowed) -> (f64, f64) {
-        POSITIVE
-    }
 }
 
-impl EffectReport for Defined {
+impl EffectReport for QuadraticDrag {
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         fitted.one_force("coefficient", format!("{}·s²/{}²", fitted.force, fitted.length))
     }

@@ -1,7 +1,7 @@
 //! A drive that slips above a force limit; the law is in `load`.
 
 use super::definition::{
-    Allowed, Coupling, EffectLaw, EffectReport, EffectSearch, Factors, Fitted, ForceLaw, Movable, Reported, Span,
+    Coupling, EffectLaw, EffectReport, EffectSearch, Factors, Fitted, ForceLaw, Movable, Reported, Span,
 };
 use super::load::{Load, MOST_OF_DRY, Machine, RATIOS, own_friction};
 use super::shape::{ShapeKey, shape};
@@ -36,9 +36,9 @@ shape! {
     }
 }
 
-pub(super) struct Defined;
+pub(super) struct RollerSlip;
 
-impl EffectLaw for Defined {
+impl EffectLaw for RollerSlip {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         let Shape { limit, creep } = Shape::of(effect);
         Some(Box::new(RollerSlipLaw(Load::in_grip(effect, limit, creep))))
@@ -51,7 +51,7 @@ impl EffectLaw for Defined {
     }
 }
 
-impl EffectSearch for Defined {
+impl EffectSearch for RollerSlip {
     fn has_optima_apart(&self) -> bool {
         true
     }
@@ -88,17 +88,12 @@ impl EffectSearch for Defined {
         own_friction(effect) <= MOST_OF_DRY * dry
             && Shape::of(effect).limit * per_command.abs() >= HOLDS * coast
     }
-    fn limits(&self, _term: usize, allowed: &Allowed) -> (f64, f64) {
-        // A small mass that always slips is a friction of another form, not a drive that lets go.
-        let gain = allowed.gain;
-        ((8.0 * gain).min(0.3 * gain), (8.0 * gain).max(0.3 * gain))
-    }
     fn start_factors(&self) -> &'static [Factors] {
         &[("limit", &[0.72, 0.85, 1.0, 1.2]), ("coast", &[0.6, 0.8, 1.0, 1.3]), ("ratio", &[0.6, 1.0, 1.7])]
     }
 }
 
-impl EffectReport for Defined {
+impl EffectReport for RollerSlip {
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         // The load's part of what the drive would need to press as hard.
         let (limit, s) = fitted.shape("limit");

@@ -2,7 +2,7 @@
 //! (Stribeck 1902; Bo and Pavelescu 1982).
 
 use super::definition::{
-    Allowed, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Movable, POSITIVE, Reported,
+    EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Movable, Reported,
     Span,
 };
 use super::joint_terms::{Drop, JointTerms};
@@ -39,9 +39,9 @@ shape! {
     }
 }
 
-pub(super) struct Defined;
+pub(super) struct StribeckFriction;
 
-impl EffectLaw for Defined {
+impl EffectLaw for StribeckFriction {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         let Shape { speed, exponent } = Shape::of(effect);
         Some(Box::new(StribeckFrictionLaw { speed, exponent }))
@@ -62,25 +62,22 @@ impl EffectLaw for Defined {
     }
 }
 
-impl EffectSearch for Defined {
+impl EffectSearch for StribeckFriction {
     fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
         let from = (2.0 * span.speed_floor).max(0.004 * span.speed);
-        let at = |exponent: f64| {
+        let falls = |exponent: f64| {
             logarithmic(from, 0.4 * span.speed, 8)
                 .into_iter()
                 .map(move |speed| Effect::shaped(name, &[("speed", speed), ("exponent", exponent)]))
         };
-        at(1.0).chain(at(2.0)).collect()
+        falls(1.0).chain(falls(2.0)).collect()
     }
     fn movable(&self, _effect: &Effect, span: &Span) -> Vec<Movable> {
         vec![("speed", 0.002 * span.speed, span.speed), ("exponent", 0.7, 2.3)]
     }
-    fn limits(&self, _term: usize, _allowed: &Allowed) -> (f64, f64) {
-        POSITIVE
-    }
 }
 
-impl EffectReport for Defined {
+impl EffectReport for StribeckFriction {
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         vec![
             Reported::new("peak", fitted.scaled(fitted.term(0)), fitted.force),

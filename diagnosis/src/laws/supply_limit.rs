@@ -20,9 +20,9 @@ shape! {
 const LIMITS: [f64; 5] = [0.6, 0.85, 1.2, 1.7, 2.4];
 const SPEEDS: [f64; 4] = [1.05, 1.3, 1.8, 2.6];
 
-pub(super) struct Defined;
+pub(super) struct SupplyLimit;
 
-impl EffectLaw for Defined {
+impl EffectLaw for SupplyLimit {
     fn command_law(&self, effect: &Effect) -> Option<CommandLaw> {
         let Shape { limit, no_load_speed } = Shape::of(effect);
         Some(CommandLaw::Supply { limit, no_load_speed })
@@ -32,16 +32,16 @@ impl EffectLaw for Defined {
     }
 }
 
-impl EffectSearch for Defined {
+impl EffectSearch for SupplyLimit {
     fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
-        let at = |limit: f64, speed: f64| {
+        let line = |limit: f64, speed: f64| {
             let shape = [("limit", limit * span.command), ("no_load_speed", speed * span.speed)];
             Effect::shaped(name, &shape)
         };
         // A line above the largest command at the fast speed takes nothing.
         let binds = |limit: f64, speed: f64| limit * (1.0 - 1.0 / speed) < 1.0;
         let all = LIMITS.iter().flat_map(|limit| SPEEDS.iter().map(move |speed| (*limit, *speed)));
-        all.filter(|(limit, speed)| binds(*limit, *speed)).map(|(limit, speed)| at(limit, speed)).collect()
+        all.filter(|(limit, speed)| binds(*limit, *speed)).map(|(limit, speed)| line(limit, speed)).collect()
     }
     fn movable(&self, _effect: &Effect, span: &Span) -> Vec<Movable> {
         let (command, speed) = (span.command, span.speed);
@@ -52,7 +52,7 @@ impl EffectSearch for Defined {
     }
 }
 
-impl EffectReport for Defined {
+impl EffectReport for SupplyLimit {
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         let speed = Reported::new("no_load_speed", fitted.shape("no_load_speed"), format!("{}/s", fitted.length));
         vec![speed, Reported::new("limit", fitted.shape("limit"), fitted.command.clone())]

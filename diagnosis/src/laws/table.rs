@@ -19,7 +19,7 @@ pub struct ForceTable {
 }
 
 /// Most places of a table.
-const MOST: usize = 100_000;
+const MOST_PLACES: usize = 100_000;
 
 impl ForceTable {
     /// Checks that the table can be run; the reason where not.
@@ -40,9 +40,9 @@ impl ForceTable {
             }
         }
         let wanted: usize = self.grid.iter().map(Vec::len).product();
-        if wanted > MOST || self.force.len() != wanted {
+        if wanted > MOST_PLACES || self.force.len() != wanted {
             return Err(format!(
-                "table.force must hold {wanted} values, one for every place, and at most {MOST}"
+                "table.force must hold {wanted} values, one for every place, and at most {MOST_PLACES}"
             ));
         }
         if self.grid.iter().flatten().chain(&self.force).any(|x| !x.is_finite() || x.abs() > 1e30) {
@@ -88,7 +88,7 @@ impl TableLaw {
     /// Values of the variables; `velocity` in place of the state's, whose sign may be asked for at
     /// rest.
     fn values(&self, s: &State, velocity: f64) -> [f64; 2] {
-        let of = |variable: &Variable| match variable {
+        let value_of = |variable: &Variable| match variable {
             Variable::Speed => velocity,
             Variable::Travel => s.position,
             Variable::Angle => s.position.rem_euclid(self.turn),
@@ -97,7 +97,7 @@ impl TableLaw {
             Variable::Time => s.time,
         };
         let mut values = [0.0; 2];
-        self.table.over.iter().zip(&mut values).for_each(|(variable, value)| *value = of(variable));
+        self.table.over.iter().zip(&mut values).for_each(|(variable, value)| *value = value_of(variable));
         values
     }
 }
@@ -126,9 +126,9 @@ impl ForceLaw for TableLaw {
     }
 }
 
-pub(super) struct Defined;
+pub(super) struct Table;
 
-impl EffectLaw for Defined {
+impl EffectLaw for Table {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         let table = effect.table.clone()?;
         Some(Box::new(TableLaw { table, turn: effect.turn().unwrap_or(TAU), way: 0.0, turned: 0.0 }))
@@ -138,7 +138,7 @@ impl EffectLaw for Defined {
     }
 }
 
-impl EffectSearch for Defined {
+impl EffectSearch for Table {
     fn is_sought(&self) -> bool {
         false
     }
@@ -148,7 +148,7 @@ impl EffectSearch for Defined {
     }
 }
 
-impl EffectReport for Defined {
+impl EffectReport for Table {
     /// It is drawn, and has no values of its own.
     fn report(&self, _fitted: &Fitted) -> Vec<Reported> {
         Vec::new()
@@ -189,15 +189,15 @@ mod tests {
     #[test]
     fn what_is_no_table_is_refused_with_the_reason() {
         let right = ForceTable { over: vec![Variable::Time], grid: vec![vec![0.0, 1.0]], force: vec![1.0, 2.0] };
-        let with = |change: fn(&mut ForceTable)| {
+        let refusal = |change: fn(&mut ForceTable)| {
             let mut table = right.clone();
             change(&mut table);
             table.check().unwrap_err()
         };
-        assert!(with(|t| t.over.clear()).contains("one or two"));
-        assert!(with(|t| t.over.push(Variable::Time)).contains("twice"));
-        assert!(with(|t| t.grid[0] = vec![1.0, 0.0]).contains("fall"));
-        assert!(with(|t| t.force.push(0.0)).contains("2 values"));
-        assert!(with(|t| t.force[0] = f64::NAN).contains("finite"));
+        assert!(refusal(|t| t.over.clear()).contains("one or two"));
+        assert!(refusal(|t| t.over.push(Variable::Time)).contains("twice"));
+        assert!(refusal(|t| t.grid[0] = vec![1.0, 0.0]).contains("fall"));
+        assert!(refusal(|t| t.force.push(0.0)).contains("2 values"));
+        assert!(refusal(|t| t.force[0] = f64::NAN).contains("finite"));
     }
 }

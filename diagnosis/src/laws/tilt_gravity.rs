@@ -20,9 +20,9 @@ impl ForceLaw for TiltGravityLaw {
     }
 }
 
-pub(super) struct Defined;
+pub(super) struct TiltGravity;
 
-impl EffectLaw for Defined {
+impl EffectLaw for TiltGravity {
     fn law(&self, _effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         Some(Box::new(TiltGravityLaw))
     }
@@ -31,7 +31,7 @@ impl EffectLaw for Defined {
     }
 }
 
-impl EffectSearch for Defined {
+impl EffectSearch for TiltGravity {
     fn grid(&self, name: EffectName, span: &Span) -> Vec<Effect> {
         if span.tilt { vec![Effect::shaped(name, &[])] } else { Vec::new() }
     }
@@ -40,7 +40,7 @@ impl EffectSearch for Defined {
     }
 }
 
-impl EffectReport for Defined {
+impl EffectReport for TiltGravity {
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         fitted.one_force("weight", fitted.force.into())
     }

@@ -1,14 +1,14 @@
 //! Torque periodic in the angle and proportional to the command: commutation. Its orders are sought
 //! in the residual.
 
-use super::definition::{Allowed, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Reported, Span};
+use super::definition::{EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Reported, Span};
 use super::shape::ShapeKey;
 use super::waves::{self, Waves};
 use super::{Effect, EffectName};
 
-pub(super) struct Defined;
+pub(super) struct TorqueRipple;
 
-impl EffectLaw for Defined {
+impl EffectLaw for TorqueRipple {
     fn law(&self, effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         Some(Box::new(Waves::new(effect, true)))
     }
@@ -23,25 +23,19 @@ impl EffectLaw for Defined {
     }
 }
 
-impl EffectSearch for Defined {
+impl EffectSearch for TorqueRipple {
     fn is_periodic(&self) -> bool {
         true
     }
     fn grid(&self, _name: EffectName, _span: &Span) -> Vec<Effect> {
         Vec::new()
     }
-    fn limits(&self, _term: usize, allowed: &Allowed) -> (f64, f64) {
-        // A commutation may lose most of the torque at some angle, and the part is one of the gain
-        // as it is; where that is hardly known, a ripple as large explains what cogging does.
-        let part = if allowed.is_anchored { 0.45 } else { 0.9 * allowed.gain_reach };
-        (-part * allowed.gain.abs(), part * allowed.gain.abs())
-    }
     fn freedom(&self, effect: &Effect, recordings: usize) -> usize {
         waves::freedom(effect, recordings)
     }
 }
 
-impl EffectReport for Defined {
+impl EffectReport for TorqueRipple {
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         waves::report(fitted, true)
     }

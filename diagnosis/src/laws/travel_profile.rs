@@ -51,8 +51,9 @@ pub(super) fn grid(name: EffectName, span: &Span) -> Vec<Effect> {
     if !span.rig.has_stroke {
         return Vec::new();
     }
-    let of = |degree| Effect::shaped(name, &[("low", span.low), ("high", span.high), ("degree", degree)]);
-    DEGREES.map(of).to_vec()
+    DEGREES
+        .map(|degree| Effect::shaped(name, &[("low", span.low), ("high", span.high), ("degree", degree)]))
+        .to_vec()
 }
 
 pub(super) fn degree(effect: &Effect) -> f64 {

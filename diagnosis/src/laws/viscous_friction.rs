@@ -1,7 +1,7 @@
 //! Friction that grows with speed, where the nominal model has none: `-viscous·q̇`.
 
 use super::definition::{
-    Allowed, EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, NominalTerm, POSITIVE, Plain, Reported,
+    EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, NominalTerm, Plain, Reported,
     Span,
 };
 use super::joint_terms::JointTerms;
@@ -22,9 +22,9 @@ impl ForceLaw for ViscousFrictionLaw {
     }
 }
 
-pub(super) struct Defined;
+pub(super) struct ViscousFriction;
 
-impl EffectLaw for Defined {
+impl EffectLaw for ViscousFriction {
     fn law(&self, _effect: &Effect) -> Option<Box<dyn ForceLaw>> {
         Some(Box::new(ViscousFrictionLaw))
     }
@@ -40,19 +40,16 @@ impl EffectLaw for Defined {
     }
 }
 
-impl EffectSearch for Defined {
+impl EffectSearch for ViscousFriction {
     fn grid(&self, name: EffectName, _span: &Span) -> Vec<Effect> {
         vec![Effect::shaped(name, &[])]
-    }
-    fn limits(&self, _term: usize, _allowed: &Allowed) -> (f64, f64) {
-        POSITIVE
     }
     fn plain(&self, _effect: &Effect) -> Option<Plain> {
         Some(Plain { rank: 1, has_twin: false })
     }
 }
 
-impl EffectReport for Defined {
+impl EffectReport for ViscousFriction {
     fn report(&self, fitted: &Fitted) -> Vec<Reported> {
         fitted.one_force("viscous", format!("{}·s/{}", fitted.force, fitted.length))
     }

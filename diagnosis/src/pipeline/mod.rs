@@ -23,6 +23,7 @@ use crate::evidence::prepared::Prepared;
 use crate::fit::{plausibility, skew};
 use crate::propose::context::FittedModel;
 use crate::repair::Checked;
+use regression::Hypothesis;
 
 /// A callback that receives the stage and the fraction done.
 pub(crate) type Progress<'a> = &'a (dyn Fn(&str, f64) + Sync);
@@ -68,18 +69,10 @@ pub(crate) fn run(
     }
     let (fit, holdout) = (&*checked.fit, &*checked.holdout);
     let all: Vec<&Recording> = fit.iter().chain(holdout).collect();
-    let proposed = |skew_rows| {
-        let mut prepared = prepare::prepare(rig, checked, skew_rows, progress);
-        progress("comparing shares of the force", 0.12);
-        let rounds = proposals::propose(&prepared, checked);
-        prepared.unsought = proposals::unsought(&rounds);
-        let found = search::search(&prepared, progress);
-        (prepared, rounds, found)
-    };
-    let (mut prepared, mut rounds, mut found) = proposed(None);
+    let (mut prepared, mut rounds, mut found) = proposed(rig, checked, None, progress);
     let check = check::check(rig, checked, &prepared);
     if let Some(rows) = hidden_skew(&prepared, &found) {
-        (prepared, rounds, found) = proposed(Some(rows));
+        (prepared, rounds, found) = proposed(rig, checked, Some(rows), progress);
     }
     let assessed = assessed(&prepared, found, &rounds);
     progress("writing down", 0.95);
@@ -89,6 +82,22 @@ pub(crate) fn run(
         Err(reason) => Diagnosis::CannotTell { rig: Box::new(prepared.nominal.rig.clone()), reason, rate_hz },
     };
     Ok((diagnosis, Some(check)))
+}
+
+/// Recordings prepared with a skew of so many rows, if it is known, and what both proposers find in
+/// them.
+fn proposed(
+    rig: &Rig,
+    checked: &Checked,
+    skew_rows: Option<f64>,
+    progress: Progress,
+) -> (Prepared, Vec<Vec<Hypothesis>>, Found) {
+    let mut prepared = prepare::prepare(rig, checked, skew_rows, progress);
+    progress("comparing shares of the force", 0.12);
+    let rounds = proposals::propose(&prepared, checked);
+    prepared.unsought = proposals::unsought(&rounds);
+    let found = search::search(&prepared, progress);
+    (prepared, rounds, found)
 }
 
 /// The skew between command and reading, in rows, that only shows once the effects that were found

@@ -11,7 +11,7 @@ use crate::fit::blocked_recording::{BlockedRecording, Jumps};
 use crate::fit::filter::Noise;
 use crate::fit::force_residual::Estimator;
 use crate::fit::linear_fit::Fit;
-use crate::fit::lost_counts::{self, Asked};
+use crate::fit::lost_counts::{self, JumpPrior};
 use crate::fit::model::Model;
 use crate::fit::noise::{self, Colour};
 use crate::fit::nominal::Nominal;
@@ -46,10 +46,10 @@ pub(crate) fn prepare(rig: &Rig, checked: &Checked, skew_rows: Option<f64>, prog
     nominal.is_balanced = is_balanced(&refit, &nominal, &tracks, &noise, scale);
     let span = span_of(&tracks, &nominal);
     let search = JumpSearch { nominal: &nominal, count: span.count, noise: &noise, scale };
-    let spread = search.find(&mut tracks, Asked::UNKNOWN, None);
-    let asked = if spread.is_some() { Asked::KNOWN } else { Asked::UNKNOWN };
+    let spread = search.find(&mut tracks, JumpPrior::UNKNOWN, None);
+    let asked = if spread.is_some() { JumpPrior::KNOWN } else { JumpPrior::UNKNOWN };
     let first = Fit::new(&Model::default(), &nominal, &tracks, &noise);
-    let first = FittedModel { model: Model::default(), noise, fit: first, merit: 0.0 };
+    let first = FittedModel { model: Model::default(), noise, fit: first, log_score: 0.0 };
     let mut holdout = HoldoutSet::new(judging);
     holdout.follow(&first, &nominal, &span, scale);
     search.find(&mut holdout.filtered, asked, spread);
@@ -91,7 +91,12 @@ impl JumpSearch<'_> {
     /// Looks for lost counts in every recording under the null, and again with the noise that is
     /// left without them and with the knowledge that counts get lost; gives how many are lost at a
     /// time, as travel. Held-out recordings take that, `spread`, from the fitted ones.
-    fn find(&self, tracks: &mut [BlockedRecording], mut asked: Asked, spread: Option<f64>) -> Option<f64> {
+    fn find(
+        &self,
+        tracks: &mut [BlockedRecording],
+        mut asked: JumpPrior,
+        spread: Option<f64>,
+    ) -> Option<f64> {
         let nominal = self.nominal;
         let mut noise = *self.noise;
         let mut sizes = Vec::new();
@@ -107,7 +112,7 @@ impl JumpSearch<'_> {
             if sizes.is_empty() {
                 return None;
             }
-            asked = Asked::KNOWN;
+            asked = JumpPrior::KNOWN;
             let of_jumps = EffectName::ALL.iter().filter(|name| name.definition().is_of_jumps());
             let effects = of_jumps.map(|name| Effect::shaped(*name, &[])).collect();
             let model = Model { effects, ..Model::default() };

@@ -17,9 +17,9 @@ use crate::fit::model::Model;
 use crate::fit::noise::Colour;
 use crate::laws::{Effect, EffectName};
 use crate::propose::candidates;
-use crate::propose::context::{FitContext, FittedModel, MOST};
-use crate::propose::joint::in_its_own_motion;
+use crate::propose::context::{FitContext, FittedModel, MOST_EFFECTS};
 use crate::propose::predictive::left_out_costs;
+use crate::propose::two_mass::in_its_own_motion;
 use numerics::parallel;
 use std::cell::Cell;
 
@@ -39,7 +39,7 @@ pub(crate) fn search(prepared: &Prepared, progress: Progress) -> Found {
     let search = Search { prepared, progress, done: Cell::new(BEGUN) };
     let mut tried = Tried::default();
     let grown = search.forward_selection(search.start(), &mut tried);
-    search.goes_on("judging on held-out recordings");
+    search.report_progress("judging on held-out recordings");
     let mut found = search.backward_elimination(grown);
     found.standing.rejected.splice(..0, tried.rejected);
     found
@@ -48,8 +48,8 @@ pub(crate) fn search(prepared: &Prepared, progress: Progress) -> Found {
 /// The model as far as it has come, under white and under coloured noise, and the motion that goes
 /// with it.
 struct SearchState {
-    white: FittedModel,
-    slow: FittedModel,
+    white_fit: FittedModel,
+    coloured_fit: FittedModel,
     tracks: Vec<BlockedRecording>,
     /// The fitted recordings, in the motions in which recordings judge.
     judging: HoldoutSet,
@@ -83,7 +83,7 @@ struct Search<'a> {
 impl Search<'_> {
     /// Tells that a step is done. Nobody knows how many follow, so each takes the same share of the
     /// rest.
-    fn goes_on(&self, stage: &str) {
+    fn report_progress(&self, stage: &str) {
         self.done.set(self.done.get() + STEP * (SEARCHED - self.done.get()));
         (self.progress)(stage, self.done.get());
     }
@@ -96,17 +96,17 @@ impl Search<'_> {
     fn start(&self) -> SearchState {
         let Prepared { fit, noise, .. } = self.prepared;
         let context = self.context(fit);
-        let white = context.fit(Model::default(), noise, Colour::White);
-        let slow = context.fit_slow(Model::default(), &[noise, &white.noise]);
-        let judging = self.followed(&HoldoutSet::new(fit.clone()), &white);
-        SearchState { white, slow, tracks: fit.clone(), judging }
+        let white_fit = context.fit(Model::default(), noise, Colour::White);
+        let coloured_fit = context.fit_coloured(Model::default(), &[noise, &white_fit.noise]);
+        let judging = self.followed(&HoldoutSet::new(fit.clone()), &white_fit);
+        SearchState { white_fit, coloured_fit, tracks: fit.clone(), judging }
     }
 
     /// Adds effects one after another as long as one generalises.
     fn forward_selection(&self, mut now: SearchState, tried: &mut Tried) -> SearchState {
         let mut before = None;
-        while now.white.model.effects.len() < MOST {
-            let step = now.white.model.effects.len();
+        while now.white_fit.model.effects.len() < MOST_EFFECTS {
+            let step = now.white_fit.model.effects.len();
             let Some(next) = self.with_one_more(&now, tried, TRIED * (step + 1)) else { break };
             if !next.generalises && before.is_some() {
                 break;
@@ -121,11 +121,11 @@ impl Search<'_> {
 
     /// Removes the effects that do not generalise when all are judged together.
     fn backward_elimination(&self, now: SearchState) -> Found {
-        let SearchState { white, slow, tracks, .. } = now;
-        let holdout = self.followed(&self.prepared.holdout, &white);
+        let SearchState { white_fit, coloured_fit, tracks, .. } = now;
+        let holdout = self.followed(&self.prepared.holdout, &white_fit);
         let context = self.context(&tracks);
-        let null = context.fit_slow(Model::default(), &[&self.prepared.noise, &white.noise]);
-        let standing = eliminate(slow, &context, &holdout, &null.noise, &white.noise, &[]);
+        let null = context.fit_coloured(Model::default(), &[&self.prepared.noise, &white_fit.noise]);
+        let standing = eliminate(coloured_fit, &context, &holdout, &null.noise, &white_fit.noise, &[]);
         Found { fit: tracks, holdout, null, standing }
     }
 
@@ -141,29 +141,29 @@ impl Search<'_> {
     /// to; at most `most` may have been judged by then.
     fn with_one_more(&self, now: &SearchState, tried: &mut Tried, most: usize) -> Option<Next> {
         let on = self.context(&now.tracks);
-        self.goes_on(SEARCHING);
-        let candidates = on.screen(&now.white, &|_| true);
-        self.goes_on(SEARCHING);
-        let mut finalists = on.finalists(&now.white, &candidates);
-        self.goes_on(SEARCHING);
+        self.report_progress(SEARCHING);
+        let candidates = on.screen(&now.white_fit, &|_| true);
+        self.report_progress(SEARCHING);
+        let mut finalists = on.finalists(&now.white_fit, &candidates);
+        self.report_progress(SEARCHING);
         on.polish(&mut finalists);
-        order_near_ties(&on, now.white.merit, &mut finalists);
-        if now.white.model.effects.is_empty() && !tried.plain {
+        order_near_ties(&on, now.white_fit.log_score, &mut finalists);
+        if now.white_fit.model.effects.is_empty() && !tried.plain {
             tried.plain = true;
-            let best = finalists.first().map_or(0.0, |best| best.merit - now.white.merit);
+            let best = finalists.first().map_or(0.0, |best| best.log_score - now.white_fit.log_score);
             if let Some(next) = self.with_plain_forces(now, best) {
                 return Some(next);
             }
         }
         let mut promising = None;
         for finalist in finalists {
-            if finalist.merit - now.white.merit < MIN_LOG_LIKELIHOOD_GAIN || tried.count >= most {
+            if finalist.log_score - now.white_fit.log_score < MIN_LOG_LIKELIHOOD_GAIN || tried.count >= most {
                 break;
             }
             tried.count += 1;
-            self.goes_on(SEARCHING);
+            self.report_progress(SEARCHING);
             let name = finalist.model.effects.last().expect("a finalist adds an effect").name;
-            let finalist = with_enough_laws(&on, finalist);
+            let finalist = prefer_fewer_waves(&on, finalist);
             match self.judge(now, finalist, promising.is_none()) {
                 Judged::Generalises(state) => return Some(Next { state, generalises: true }),
                 Judged::Rejected { why, provisional } => {
@@ -180,22 +180,24 @@ impl Search<'_> {
     /// it may generalise together with another effect.
     fn judge(&self, now: &SearchState, finalist: FittedModel, may_promise: bool) -> Judged {
         let on = self.context(&now.tracks);
-        let with = on.fit_slow(finalist.model.clone(), &[&now.slow.noise, &finalist.noise]);
-        if with.merit - now.slow.merit < MIN_LOG_LIKELIHOOD_GAIN {
+        let with = on.fit_coloured(finalist.model.clone(), &[&now.coloured_fit.noise, &finalist.noise]);
+        if with.log_score - now.coloured_fit.log_score < MIN_LOG_LIKELIHOOD_GAIN {
             return Judged::Rejected { why: Rejection::SlowDisturbance, provisional: None };
         }
-        let (tracks, white) = in_its_own_motion(&now.tracks, finalist, &on);
+        let (tracks, white_fit) = in_its_own_motion(&now.tracks, finalist, &on);
         let own = self.context(&tracks);
-        let judging = self.followed(&now.judging, &white);
-        let judged =
-            gather_evidence(&own, &white, &with.noise, &judging).pop().expect("the last effect is judged");
-        let last = white.model.effects.len() - 1;
+        let judging = self.followed(&now.judging, &white_fit);
+        let judged = gather_evidence(&own, &white_fit, &with.noise, &judging)
+            .pop()
+            .expect("the last effect is judged");
+        let last = white_fit.model.effects.len() - 1;
         let rejection = judged.rejection_in_search();
-        let is_absent = || parameters::is_absent(&own, &white, last).then_some(Rejection::NoSize);
+        let is_absent = || parameters::is_absent(&own, &white_fit, last).then_some(Rejection::NoSize);
         let rejection = rejection.or_else(is_absent);
         let is_kept = rejection.is_none() || (may_promise && judged.is_provisional());
-        let slow = is_kept.then(|| own.fit_slow(white.model.clone(), &[&with.noise, &white.noise]));
-        let state = slow.map(|slow| SearchState { white, slow, tracks, judging });
+        let coloured_fit =
+            is_kept.then(|| own.fit_coloured(white_fit.model.clone(), &[&with.noise, &white_fit.noise]));
+        let state = coloured_fit.map(|coloured_fit| SearchState { white_fit, coloured_fit, tracks, judging });
         match (rejection, state) {
             (None, Some(state)) => Judged::Generalises(state),
             (why, provisional) => {
@@ -208,23 +210,24 @@ impl Search<'_> {
     /// the most that any effect gains, and all of them generalise.
     fn with_plain_forces(&self, now: &SearchState, best: f64) -> Option<Next> {
         let on = self.context(&now.tracks);
-        for white in best_plain_models(&on, now) {
+        for white_fit in best_plain_models(&on, now) {
             let has_twin =
                 |effect: &Effect| effect.name.definition().plain(effect).is_some_and(|it| it.has_twin);
             let enough =
-                if white.model.effects.iter().any(has_twin) { PLAIN_NEARLY_ALL } else { PLAIN_ENOUGH };
-            let gain = white.merit - now.white.merit;
+                if white_fit.model.effects.iter().any(has_twin) { PLAIN_NEARLY_ALL } else { PLAIN_ENOUGH };
+            let gain = white_fit.log_score - now.white_fit.log_score;
             if gain < MIN_LOG_LIKELIHOOD_GAIN || gain < enough * best {
                 continue;
             }
-            let (tracks, white) = in_its_own_motion(&now.tracks, white, &on);
+            let (tracks, white_fit) = in_its_own_motion(&now.tracks, white_fit, &on);
             let own = self.context(&tracks);
-            let judging = self.followed(&now.judging, &white);
-            let slow = own.fit_slow(white.model.clone(), &[&now.slow.noise, &white.noise]);
-            let judged = gather_evidence(&own, &white, &slow.noise, &judging);
-            let is_there = |place: usize| !parameters::is_absent(&own, &white, place);
+            let judging = self.followed(&now.judging, &white_fit);
+            let coloured_fit =
+                own.fit_coloured(white_fit.model.clone(), &[&now.coloured_fit.noise, &white_fit.noise]);
+            let judged = gather_evidence(&own, &white_fit, &coloured_fit.noise, &judging);
+            let is_there = |place: usize| !parameters::is_absent(&own, &white_fit, place);
             if judged.iter().all(|judged| judged.rejection().is_none()) && (0..judged.len()).all(is_there) {
-                let state = SearchState { white, slow, tracks, judging };
+                let state = SearchState { white_fit, coloured_fit, tracks, judging };
                 return Some(Next { state, generalises: true });
             }
         }
@@ -234,7 +237,7 @@ impl Search<'_> {
 
 /// Returns the candidate, or its rival with one periodic law fewer where the stretches that a fit
 /// leaves out are as likely with that.
-fn with_enough_laws(on: &FitContext, candidate: FittedModel) -> FittedModel {
+fn prefer_fewer_waves(on: &FitContext, candidate: FittedModel) -> FittedModel {
     let Some(rival) = on.with_fewer_laws(&candidate) else { return candidate };
     let cost = |one: &FittedModel| left_out_costs(&one.fit).iter().sum::<f64>();
     if cost(&rival) <= cost(&candidate) { rival } else { candidate }
@@ -266,29 +269,30 @@ fn plain_sets(on: &FitContext) -> Vec<Model> {
     plain.sort_by_key(|(rank, _)| *rank);
     let mut sets: Vec<Vec<Effect>> = vec![Vec::new()];
     for (_, effect) in plain {
-        let with = |set: &Vec<Effect>| {
+        let extended = |set: &Vec<Effect>| {
             let fits = set.len() < PLAIN_TOGETHER && set.iter().all(|other| other.name != effect.name);
             fits.then(|| set.iter().chain([&effect]).cloned().collect::<Vec<_>>())
         };
-        sets.extend(sets.iter().filter_map(with).collect::<Vec<_>>());
+        sets.extend(sets.iter().filter_map(extended).collect::<Vec<_>>());
     }
     sets.into_iter().skip(1).map(|effects| Model { effects, ..Model::default() }).collect()
 }
 
 /// The best model of each number of plain forces under its own noise, best first.
 fn best_plain_models(on: &FitContext, now: &SearchState) -> Vec<FittedModel> {
-    let mut ranked = parallel::map_all(&plain_sets(on), |model| on.fit_at(model.clone(), &now.white.noise));
-    ranked.retain(|fitted| fitted.merit - now.white.merit > MIN_LOG_LIKELIHOOD_GAIN);
-    ranked.sort_by(|a, b| b.merit.total_cmp(&a.merit));
+    let mut ranked =
+        parallel::map_all(&plain_sets(on), |model| on.fit_at(model.clone(), &now.white_fit.noise));
+    ranked.retain(|fitted| fitted.log_score - now.white_fit.log_score > MIN_LOG_LIKELIHOOD_GAIN);
+    ranked.sort_by(|a, b| b.log_score.total_cmp(&a.log_score));
     let mut sizes: Vec<usize> = Vec::new();
     let mut fitted: Vec<FittedModel> = Vec::new();
     for one in ranked {
         if !sizes.contains(&one.model.effects.len()) {
             sizes.push(one.model.effects.len());
-            fitted.push(on.fit(one.model, &now.white.noise, Colour::White));
+            fitted.push(on.fit(one.model, &now.white_fit.noise, Colour::White));
         }
     }
-    fitted.sort_by(|a, b| b.merit.total_cmp(&a.merit));
+    fitted.sort_by(|a, b| b.log_score.total_cmp(&a.log_score));
     fitted
 }
 
@@ -298,18 +302,18 @@ const NEAR_TIE: f64 = 0.9;
 /// Puts near ties in the order of the force that they leave on the fitted recordings: what they
 /// gain on the noise of a null that explains little says less.
 fn order_near_ties(context: &FitContext, before: f64, finalists: &mut [FittedModel]) {
-    let Some(best) = finalists.first().map(|c| c.merit - before) else { return };
-    let near = finalists.iter().take_while(|c| c.merit - before >= NEAR_TIE * best).count();
+    let Some(best) = finalists.first().map(|c| c.log_score - before) else { return };
+    let near = finalists.iter().take_while(|c| c.log_score - before >= NEAR_TIE * best).count();
     if near < 2 {
         return;
     }
     let estimator = Estimator::new(context.tracks, &finalists[0].noise, context.scale);
-    let left = |c: &FittedModel| {
+    let error_left = |c: &FittedModel| {
         let inertia = parameters::scale(context.nominal, c).0;
         let totals = c.fit.totals(context.tracks);
         estimator.rms(&forces(&estimator, context.tracks, &totals, inertia), context.tracks)
     };
-    finalists[..near].sort_by_cached_key(|c| left(c).to_bits());
+    finalists[..near].sort_by_cached_key(|c| error_left(c).to_bits());
 }
 
 #[cfg(test)]

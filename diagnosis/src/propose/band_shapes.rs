@@ -55,13 +55,13 @@ impl FitContext<'_> {
     ) -> Option<(f64, Model)> {
         let at = model.effects[place].shape[key];
         let (low, high) = ((at / REACH).max(low).ln(), (at * REACH).min(high).ln());
-        let with = |x: f64| {
+        let moved_to = |x: f64| {
             let mut moved = model.clone();
             moved.effects[place].shape.insert(key.to_owned(), x.exp());
             moved
         };
         (high > low).then(|| {
-            let moved = with(golden(low, high, STEPS, |x| -self.left_in_band(&with(x), noise)));
+            let moved = moved_to(golden(low, high, STEPS, |x| -self.left_in_band(&moved_to(x), noise)));
             (self.left_in_band(&moved, noise), moved)
         })
     }

@@ -4,7 +4,7 @@
 use crate::data::rig::Kind;
 use crate::fit::blocked_recording::BlockedRecording;
 use crate::fit::nominal::Nominal;
-use crate::laws::definition::{Believed, Movable, NominalTerm, Span};
+use crate::laws::definition::{Movable, NominalTerm, RigFacts, Span};
 use crate::laws::{Effect, EffectName as N};
 use numerics::linear::correlation;
 use regression::laws::Need;
@@ -66,7 +66,7 @@ pub(crate) fn span_of(tracks: &[BlockedRecording], nominal: &Nominal) -> Span {
         one_way: nominal.one_way,
         tilt: varies(tracks.iter().flat_map(|t| column(&t.blocks.tilt))),
         force: varies(tracks.iter().flat_map(|t| column(&t.blocks.force))),
-        rig: Believed {
+        rig: RigFacts {
             turn: nominal.rig.turn(),
             axis_turn: (nominal.rig.kind == Kind::Rotary).then_some(TAU),
             has_stroke: true,
@@ -275,7 +275,7 @@ mod tests {
             one_way: false,
             tilt: false,
             force: false,
-            rig: Believed::default(),
+            rig: RigFacts::default(),
         }
     }
 

@@ -21,7 +21,7 @@ pub(crate) struct FittedModel {
     pub(crate) noise: Noise,
     pub(crate) fit: Fit,
     /// Log-likelihood less what its freedom costs.
-    pub(crate) merit: f64,
+    pub(crate) log_score: f64,
 }
 
 /// Everything that selection works on.
@@ -40,7 +40,7 @@ pub(crate) struct FitContext<'a> {
 pub(crate) const PER_COEFFICIENT: f64 = 2.5;
 const PER_SHAPE: f64 = 4.0;
 /// Most effects that are named together.
-pub(crate) const MOST: usize = 3;
+pub(crate) const MOST_EFFECTS: usize = 3;
 
 /// Returns the cost of an effect's freedom, nats.
 pub(crate) fn cost(effect: &Effect, tracks: usize, span: &Span) -> f64 {
@@ -56,8 +56,8 @@ impl FitContext<'_> {
         let totals = first.totals(self.tracks);
         let noise = noise::estimate(self.tracks, &totals, from, self.scale, colour);
         let fit = Fit::new(&model, self.nominal, self.tracks, &noise);
-        let merit = fit.log_likelihood - self.spent(&model);
-        FittedModel { model, noise, fit, merit }
+        let log_score = fit.log_likelihood - self.spent(&model);
+        FittedModel { model, noise, fit, log_score }
     }
 
     /// Fits a model whose values are shown. Where shares of the force error select, its values are
@@ -85,20 +85,20 @@ impl FitContext<'_> {
     /// Fits a model under known noise.
     pub(crate) fn fit_at(&self, model: Model, noise: &Noise) -> FittedModel {
         let fit = Fit::new(&model, self.nominal, self.tracks, noise);
-        let merit = fit.log_likelihood - self.spent(&model);
-        FittedModel { model, noise: *noise, fit, merit }
+        let log_score = fit.log_likelihood - self.spent(&model);
+        FittedModel { model, noise: *noise, fit, log_score }
     }
 
     /// The best of fits under coloured noise from several starts: where the noise may be slow, what
     /// a model explains and what a disturbance explains are two optima.
-    pub(crate) fn fit_slow(&self, model: Model, starts: &[&Noise]) -> FittedModel {
+    pub(crate) fn fit_coloured(&self, model: Model, starts: &[&Noise]) -> FittedModel {
         let fits = parallel::map_all(starts, |from| self.fit(model.clone(), from, Colour::Slow));
-        fits.into_iter().max_by(|a, b| a.merit.total_cmp(&b.merit)).expect("at least one start")
+        fits.into_iter().max_by(|a, b| a.log_score.total_cmp(&b.log_score)).expect("at least one start")
     }
 
     /// Log-likelihood of a model's fit under some noise, where its last effect may be what its
     /// shape says.
-    pub(crate) fn merit_of(&self, model: &Model, noise: &Noise) -> f64 {
+    pub(crate) fn log_score_of(&self, model: &Model, noise: &Noise) -> f64 {
         let effect = model.effects.last().expect("there is an effect to polish");
         let effective = effective_commands(self.tracks, &model.effects);
         let ignores = |effective: Vec<Vec<f64>>| self.nominal.ignores_too_much(self.tracks, &effective);

@@ -2,7 +2,7 @@
 //! distinguished.
 
 use crate::fit::blocked_recording::BlockedRecording;
-use crate::laws::definition::Shown;
+use crate::laws::definition::ExcitationLimits;
 
 /// Range of the motion of some recordings.
 #[derive(Debug, Clone, Copy)]
@@ -29,8 +29,14 @@ const STROKE_COUNTS: f64 = 4.0;
 fn ratio(mut values: Vec<f64>, part: f64) -> f64 {
     values.sort_by(f64::total_cmp);
     let Some(last) = values.len().checked_sub(1) else { return f64::INFINITY };
-    let at = |p: f64| values[(p * last as f64).round() as usize];
-    at(1.0 - part) / at(part).max(1e-300)
+    let quantile = |p: f64| values[(p * last as f64).round() as usize];
+    quantile(1.0 - part) / quantile(part).max(1e-300)
+}
+
+/// Speeds of the blocks of one recording that move.
+fn moving_speeds(track: &BlockedRecording) -> Vec<f64> {
+    let blocks = track.motion.v.iter().zip(&track.motion.rest);
+    blocks.filter(|(_, rest)| !**rest).map(|(v, _)| v.abs()).collect()
 }
 
 /// Lengths of the strokes of one recording.
@@ -60,23 +66,9 @@ impl Excitation {
     /// Measures recordings whose motion is smoothed; `count` is one of the encoder's and `turn` the
     /// motor's, rad or m.
     pub(crate) fn of(tracks: &[BlockedRecording], count: f64, turn: Option<f64>) -> Self {
-        let moving = |track: &BlockedRecording| -> Vec<f64> {
-            track
-                .motion
-                .v
-                .iter()
-                .zip(&track.motion.rest)
-                .filter(|(_, rest)| !**rest)
-                .map(|(v, _)| v.abs())
-                .collect()
-        };
-        let speeds = ratio(tracks.iter().flat_map(moving).collect(), 0.05);
+        let speeds = ratio(tracks.iter().flat_map(moving_speeds).collect(), 0.05);
         let strokes = ratio(tracks.iter().flat_map(|t| strokes(t, STROKE_COUNTS * count)).collect(), 0.1);
-        let travel = |track: &BlockedRecording| {
-            let fold =
-                |start: f64, pick: fn(f64, f64) -> f64| track.motion.x.iter().copied().fold(start, pick);
-            fold(f64::NEG_INFINITY, f64::max) - fold(f64::INFINITY, f64::min)
-        };
+        let travel = |track: &BlockedRecording| numerics::spread::spread(&track.motion.x);
         let turns = turn.map_or(f64::INFINITY, |turn| {
             tracks.iter().map(|track| travel(track) / turn).fold(0.0, f64::max)
         });
@@ -89,12 +81,12 @@ impl Excitation {
     }
 
     /// Returns what decides between twins.
-    pub(crate) fn shown(&self) -> Shown {
-        Shown {
+    pub(crate) fn limits(&self) -> ExcitationLimits {
+        ExcitationLimits {
             one_speed: self.is_one_speed(),
             one_length: self.strokes < ONE_LENGTH,
             less_than_a_turn: self.turns < ONE_TURN,
-            ..Shown::default()
+            ..ExcitationLimits::default()
         }
     }
 }
@@ -114,7 +106,7 @@ mod tests {
             (Excitation { turns: 0.5, ..rich }, N::PositionSpring, N::MassImbalance),
         ];
         for (poor, a, b) in twins {
-            let twins = |name: N, seen: Excitation| Effect::shaped(name, &[]).twins(&seen.shown());
+            let twins = |name: N, seen: Excitation| Effect::shaped(name, &[]).twins(&seen.limits());
             assert_eq!((twins(a, poor), twins(b, poor)), (vec![b], vec![a]));
             assert!(twins(a, rich).is_empty() && twins(b, rich).is_empty());
         }

@@ -21,7 +21,7 @@ impl FitContext<'_> {
             model.effects.push(with_waves_of(own, added, self.span.travel())?);
             Some(self.fit(model, &candidate.noise, Colour::White))
         });
-        widened.max_by(|a, b| a.merit.total_cmp(&b.merit))
+        widened.max_by(|a, b| a.log_score.total_cmp(&b.log_score))
     }
 }
 

@@ -20,7 +20,7 @@ use std::f64::consts::TAU;
 
 /// Highest order of a turn that is looked for, and how many orders one effect may have.
 const HIGHEST: usize = 100;
-const MOST: usize = 14;
+const MOST_ORDERS: usize = 14;
 /// Most cycles over the travel that are looked for where no turn is known.
 const MOST_CYCLES: f64 = 480.0;
 /// Fewest half cycles over the travel where no turn is known: less is a shape along the travel.
@@ -153,7 +153,7 @@ impl<'a> Waves<'a> {
             if apart && single[index] > 3.0 {
                 kept.push(index);
             }
-            if kept.len() >= if self.whole { 2 * MOST } else { MOST } {
+            if kept.len() >= if self.whole { 2 * MOST_ORDERS } else { MOST_ORDERS } {
                 break;
             }
         }
@@ -216,11 +216,11 @@ fn terms_of(searches: &[&Waves], means: &[Vec<Means>]) -> Vec<Terms> {
     let mut all = vec![Terms::with_capacity(means.len()); searches.len() * count];
     for (r, (track, means)) in first.context.tracks.iter().zip(means).enumerate() {
         let inputs_of = |search: &&Waves| -> Vec<Input> {
-            let one = |(cos, sin): &Means| match &search.drives[r] {
+            let driven = |(cos, sin): &Means| match &search.drives[r] {
                 Some(drive) => [drive.scaled(cos), drive.scaled(sin)],
                 None => [Input::Held(cos.clone()), Input::Held(sin.clone())],
             };
-            means.iter().flat_map(one).collect()
+            means.iter().flat_map(driven).collect()
         };
         let inputs: Vec<Input> = searches.iter().flat_map(inputs_of).collect();
         let gains = &first.searched.fit.prepared[r].gains;
@@ -241,9 +241,9 @@ fn single_gains(searches: &[&Waves]) -> Vec<Vec<f64>> {
     let Some(first) = searches.first() else { return Vec::new() };
     let orders: Vec<&[f64]> = first.orders.chunks(LADDER).collect();
     let gains = parallel::map_all(&orders, |orders| gains_on_ladder(searches, orders));
-    let of =
+    let gains_of =
         |search: usize| gains.iter().flat_map(|all: &Vec<Vec<f64>>| all[search].iter().copied()).collect();
-    (0..searches.len()).map(of).collect()
+    (0..searches.len()).map(gains_of).collect()
 }
 
 /// The gain of evenly spaced orders, each by itself, for one search after another.
@@ -275,6 +275,17 @@ fn gain_of(sums: &ScoreSums) -> f64 {
     if gain.is_finite() { gain } else { 0.0 }
 }
 
+/// The gain of the coefficients at some places alone.
+fn gain_at(sums: &ScoreSums, places: &[usize]) -> f64 {
+    let mut information = Square::zero(places.len());
+    for (a, i) in places.iter().enumerate() {
+        for (b, j) in places.iter().enumerate() {
+            information.a[a * places.len() + b] = sums.information.at(*i, *j);
+        }
+    }
+    gain_of(&ScoreSums { information, score: places.iter().map(|i| sums.score[*i]).collect() })
+}
+
 /// Picks orders one after another while each brings more than it costs; `may_join` says which may
 /// join those chosen.
 fn forward(
@@ -288,19 +299,11 @@ fn forward(
         (0..recordings).flat_map(|r| [0, 1].map(|i| r * 2 * orders + 2 * order + i)).collect()
     };
     let gain_with = |chosen: &[usize]| -> f64 {
-        let index: Vec<usize> = chosen.iter().flat_map(|order| places(*order)).collect();
-        let mut part = Square::zero(index.len());
-        for (a, i) in index.iter().enumerate() {
-            for (b, j) in index.iter().enumerate() {
-                part.a[a * index.len() + b] = sums.information.at(*i, *j);
-            }
-        }
-        let score: Vec<f64> = index.iter().map(|i| sums.score[*i]).collect();
-        gain_of(&ScoreSums { information: part, score })
+        gain_at(sums, &chosen.iter().flat_map(|order| places(*order)).collect::<Vec<_>>())
     };
     let mut chosen: Vec<usize> = Vec::new();
     let mut gain = 0.0;
-    while chosen.len() < MOST.min(orders) {
+    while chosen.len() < MOST_ORDERS.min(orders) {
         let trials: Vec<(usize, f64)> = (0..orders)
             .filter(|order| !chosen.contains(order) && may_join(&chosen, *order))
             .map(|order| {

@@ -12,11 +12,11 @@ use numerics::linear::{Prior, bounded};
 pub(crate) const FOLDS: usize = 6;
 /// Neighbouring segments that are left out together: a disturbance lasts, and its neighbours must
 /// not give information on the block that is judged.
-const TOGETHER: usize = 3;
+const SEGMENTS_LEFT_OUT: usize = 3;
 
 /// The fold in which a segment of a recording is left out.
 pub(crate) fn fold_of(recording: usize, segment: usize) -> usize {
-    (segment / TOGETHER + recording) % FOLDS
+    (segment / SEGMENTS_LEFT_OUT + recording) % FOLDS
 }
 
 /// The steps from the reference that fits without each fold take.

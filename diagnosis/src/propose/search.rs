@@ -1,5 +1,4 @@
-//! Naming: forward selection of effects, backward pruning, and the swap of each effect against its
-//! rivals.
+//! Screens effects, refines their shapes and fits the finalists.
 
 use crate::fit::linear_fit::Fit;
 use crate::fit::model::Model;
@@ -8,10 +7,10 @@ use crate::laws::definition::NominalTerm;
 use crate::laws::{Effect, EffectName as N};
 use crate::propose::candidates;
 use crate::propose::context::{FitContext, FittedModel, cost};
-use crate::propose::joint;
 use crate::propose::periodic::{self, Searched};
 use crate::propose::score_statistic;
 use crate::propose::shape_search::descend;
+use crate::propose::two_mass;
 use numerics::golden_section::golden;
 use numerics::parallel;
 use regression::laws::Need;
@@ -38,14 +37,14 @@ fn along(
     steps: usize,
     value: &dyn Fn(&Effect) -> f64,
 ) -> Option<(f64, Effect)> {
-    let with = |x: f64| {
+    let moved_to = |x: f64| {
         let mut trial = effect.clone();
         trial.shape.insert(key.to_owned(), x.exp());
         trial
     };
     let (a, b) = (low.ln(), high.ln());
     (b > a).then(|| {
-        let found = with(golden(a, b, steps, |x| value(&with(x))));
+        let found = moved_to(golden(a, b, steps, |x| value(&moved_to(x))));
         (value(&found), found)
     })
 }
@@ -53,7 +52,7 @@ fn along(
 impl FitContext<'_> {
     /// The wanted effects that are not in a model yet and that these recordings may show in
     /// addition to it.
-    pub(crate) fn that_may_be_added(&self, model: &Model, wanted: &dyn Fn(N) -> bool) -> Vec<N> {
+    pub(crate) fn addable_effects(&self, model: &Model, wanted: &dyn Fn(N) -> bool) -> Vec<N> {
         let is_dry = |e: &Effect| e.name.definition().nominal_term() == Some(NominalTerm::Coulomb);
         let dry = self.nominal.has(NominalTerm::Coulomb) || model.effects.iter().any(is_dry);
         self.that_may_show(model, &|name| (dry || !name.needs(Need::DryFriction)) && wanted(name))
@@ -81,33 +80,33 @@ impl FitContext<'_> {
         wanted: &(dyn Fn(N) -> bool + Sync),
     ) -> Vec<(Effect, f64)> {
         let residuals: Vec<Vec<f64>> = (0..self.tracks.len()).map(|r| now.fit.residual(r)).collect();
-        let all = self.that_may_be_added(&now.model, wanted);
+        let all = self.addable_effects(&now.model, wanted);
         let periodic: Vec<N> = all.iter().copied().filter(|name| name.definition().is_periodic()).collect();
         let searched = Searched { fit: &now.fit, residuals: &residuals, model: &now.model };
         let waves = periodic::search(&periodic, self, &searched);
-        let best_of = |name: &N| -> Option<(Effect, f64)> {
+        let worth_adding = |name: &N| -> Option<(Effect, f64)> {
             let best = match name.definition().is_periodic() {
-                true => waves.iter().find(|(effect, _)| effect.name == *name).cloned(),
-                false => {
-                    let grid = candidates::shapes(*name, self.span, self.nominal);
-                    score_statistic::best_on_grid(
-                        &now.fit,
-                        &residuals,
-                        &now.model,
-                        self.tracks,
-                        &grid,
-                        self.nominal,
-                    )
-                    .map(|(effect, score)| (effect, score.gain))
+                true => {
+                    waves.iter().find(|(effect, _)| effect.name == *name).map(|(effect, _)| effect.clone())
                 }
+                false => self.best_on_grid(now, &residuals, *name),
             };
-            let (effect, gain) = self.refine(now, &residuals, best?.0);
+            let (effect, gain) = self.refine(now, &residuals, best?);
             let worth = gain - cost(&effect, self.tracks.len(), self.span);
             (worth > 0.0).then_some((effect, worth))
         };
-        let mut found: Vec<(Effect, f64)> = parallel::map_all(&all, best_of).into_iter().flatten().collect();
+        let found = parallel::map_all(&all, worth_adding);
+        let mut found: Vec<(Effect, f64)> = found.into_iter().flatten().collect();
         found.sort_by(|a, b| b.1.total_cmp(&a.1));
         found
+    }
+
+    /// The shape of an effect's grid with the largest score gain.
+    fn best_on_grid(&self, now: &FittedModel, residuals: &[Vec<f64>], name: N) -> Option<Effect> {
+        let grid = candidates::shapes(name, self.span, self.nominal);
+        let (fit, model) = (&now.fit, &now.model);
+        score_statistic::best_on_grid(fit, residuals, model, self.tracks, &grid, self.nominal)
+            .map(|(effect, _)| effect)
     }
 
     /// Moves the shape of an effect to its largest score gain, one value after another.
@@ -141,7 +140,7 @@ impl FitContext<'_> {
             model.effects.push(effect.clone());
             self.fit(model, &now.noise, Colour::White)
         });
-        full.sort_by(|a, b| b.merit.total_cmp(&a.merit));
+        full.sort_by(|a, b| b.log_score.total_cmp(&a.log_score));
         full
     }
 
@@ -150,32 +149,35 @@ impl FitContext<'_> {
         let polished =
             parallel::map_all(&candidates[..candidates.len().min(POLISHED)], |c| self.polish_one(c));
         for (old, new) in candidates.iter_mut().zip(polished) {
-            if new.merit > old.merit {
+            if new.log_score > old.log_score {
                 *old = new;
             }
         }
-        candidates.sort_by(|a, b| b.merit.total_cmp(&a.merit));
+        candidates.sort_by(|a, b| b.log_score.total_cmp(&a.log_score));
     }
 
     /// Looks for waves again under the noise that those found first have left: weak ones hide in
     /// the noise of a null that knows of none.
     fn search_waves_again(&self, candidate: &FittedModel) -> FittedModel {
-        let again = |from: &FittedModel| {
-            let mut model = from.model.clone();
-            let name = model.effects.pop()?.name;
-            let base = Fit::new(&model, self.nominal, self.tracks, &from.noise);
-            let residuals: Vec<Vec<f64>> = (0..self.tracks.len()).map(|r| base.residual(r)).collect();
-            let searched = Searched { fit: &base, residuals: &residuals, model: &model };
-            let (effect, _) = periodic::search(&[name], self, &searched).pop()?;
-            model.effects.push(effect);
-            Some(self.fit(model, &from.noise, Colour::White)).filter(|found| found.merit > from.merit)
-        };
         let mut best = self.fit(candidate.model.clone(), &candidate.noise, Colour::White);
         for _ in 0..SEARCHES {
-            let Some(found) = again(&best) else { break };
+            let Some(found) = self.with_better_waves(&best) else { break };
             best = found;
         }
         best
+    }
+
+    /// Fits the model with the waves that a search under its noise finds; none where they are no
+    /// better.
+    fn with_better_waves(&self, from: &FittedModel) -> Option<FittedModel> {
+        let mut model = from.model.clone();
+        let name = model.effects.pop()?.name;
+        let base = Fit::new(&model, self.nominal, self.tracks, &from.noise);
+        let residuals: Vec<Vec<f64>> = (0..self.tracks.len()).map(|r| base.residual(r)).collect();
+        let searched = Searched { fit: &base, residuals: &residuals, model: &model };
+        let (effect, _) = periodic::search(&[name], self, &searched).pop()?;
+        model.effects.push(effect);
+        Some(self.fit(model, &from.noise, Colour::White)).filter(|found| found.log_score > from.log_score)
     }
 
     /// Moves the shape of the last effect to the largest likelihood of the whole fit.
@@ -185,7 +187,7 @@ impl FitContext<'_> {
             return self.search_waves_again(candidate);
         }
         let mut model = candidate.model.clone();
-        let merit = |model: &Model| self.merit_of(model, &candidate.noise);
+        let log_score = |model: &Model| self.log_score_of(model, &candidate.noise);
         let mut best = candidate.fit.log_likelihood;
         let movable = candidates::movable(&candidate.model.effects[last], self.span);
         // The score test holds the gain and looks near by: delays, drifts and events have optima
@@ -199,7 +201,7 @@ impl FitContext<'_> {
                 for factor in APART {
                     let mut trial = model.clone();
                     trial.effects[last].shape.insert(key.to_owned(), (at * factor).clamp(low, high));
-                    let value = merit(&trial);
+                    let value = log_score(&trial);
                     if value > best {
                         best = value;
                         taken = Some((factor, trial));
@@ -214,26 +216,26 @@ impl FitContext<'_> {
             }
         }
         if let Some((value, found)) =
-            joint::search(self, &model, &candidate.noise, &merit).filter(|f| f.0 > best)
+            two_mass::search(self, &model, &candidate.noise, &log_score).filter(|f| f.0 > best)
         {
             (best, model) = (value, found);
         }
         for (key, low, high) in movable.iter().copied() {
             let at = model.effects[last].shape[key];
             let ends = ((at / 1.6).max(low), (at * 1.6).min(high));
-            let with = |effect: &Effect| {
+            let with_last = |effect: &Effect| {
                 let mut trial = model.clone();
                 trial.effects[last] = effect.clone();
                 trial
             };
-            let found = along(&model.effects[last], key, ends, 8, &|effect| merit(&with(effect)));
+            let found = along(&model.effects[last], key, ends, 8, &|effect| log_score(&with_last(effect)));
             if let Some((value, effect)) = found.filter(|(value, _)| *value > best) {
                 best = value;
                 model.effects[last] = effect;
             }
         }
-        let found = descend(self, model, &candidate.noise, best, &merit);
-        let (_, model) = joint::settle(self, found, &candidate.noise, &merit);
+        let found = descend(self, model, &candidate.noise, best, &log_score);
+        let (_, model) = two_mass::settle(self, found, &candidate.noise, &log_score);
         self.fit(model, &candidate.noise, Colour::White)
     }
 }

@@ -21,14 +21,14 @@ const PARTS: [f64; 3] = [1.0, 0.4, 0.15];
 /// Gain of log-likelihood below which it is not worth going on.
 const ENOUGH: f64 = 0.5;
 
-/// The model with the shape of its last effect where `merit` is larger than `best`, as far as steps
-/// downhill lead, and what it is worth there.
+/// The model with the shape of its last effect where `log_score` is larger than `best`, as far as
+/// steps downhill lead, and its score there.
 pub(crate) fn descend(
     context: &FitContext,
     mut model: Model,
     noise: &Noise,
     mut best: f64,
-    merit: &dyn Fn(&Model) -> f64,
+    log_score: &dyn Fn(&Model) -> f64,
 ) -> (f64, Model) {
     let last = model.effects.len() - 1;
     let movable = candidates::movable(&model.effects[last], context.span);
@@ -40,7 +40,7 @@ pub(crate) fn descend(
                 let at = trial.effects[last].shape.get_mut(*key).expect("what may move is there");
                 *at = (*at * (part * step.clamp(-LONGEST, LONGEST)).exp()).clamp(*low, *high);
             }
-            let value = merit(&trial);
+            let value = log_score(&trial);
             (value > best).then_some((value, trial))
         };
         let Some((value, trial)) = PARTS.into_iter().find_map(moved) else { break };

@@ -36,7 +36,7 @@ pub(super) struct Balance<'a> {
 
 /// The part of a command that its balance leaves.
 #[derive(Clone, Copy)]
-pub(super) struct Left {
+pub(super) struct Unbalanced {
     /// As a part of its variance.
     pub(super) part: f64,
     /// The part of its variance that inertia takes.
@@ -90,7 +90,7 @@ impl<'a> Balance<'a> {
 
     /// Returns the part that the balance leaves of the recorded command if it acts `late_s` after
     /// its stamps.
-    pub(super) fn left(&self, late_s: f64) -> Left {
+    pub(super) fn left(&self, late_s: f64) -> Unbalanced {
         let start = self.recording.time_s[0];
         let stamps: Vec<f64> = self.recording.time_s.iter().map(|t| t - start + late_s).collect();
         self.left_of(&cells(&stamps, &self.recording.command, &self.grid, self.step_s))
@@ -98,25 +98,25 @@ impl<'a> Balance<'a> {
 
     /// Returns the part that the balance leaves of a command that goes straight from one of some
     /// rows to the next.
-    pub(super) fn left_between(&self, rows: &[usize]) -> Left {
+    pub(super) fn left_between(&self, rows: &[usize]) -> Unbalanced {
         let start = self.recording.time_s[0];
-        let at = |row: &usize| (self.recording.time_s[*row] - start, self.recording.command[*row]);
+        let point = |row: &usize| (self.recording.time_s[*row] - start, self.recording.command[*row]);
         let mut next = 0;
         let line: Vec<f64> = self
             .grid
             .iter()
             .map(|t| {
-                while next + 1 < rows.len() && at(&rows[next]).0 < *t {
+                while next + 1 < rows.len() && point(&rows[next]).0 < *t {
                     next += 1;
                 }
-                let ((t0, u0), (t1, u1)) = (at(&rows[next.saturating_sub(1)]), at(&rows[next]));
+                let ((t0, u0), (t1, u1)) = (point(&rows[next.saturating_sub(1)]), point(&rows[next]));
                 if t1 > t0 { u0 + (u1 - u0) * ((t - t0) / (t1 - t0)).clamp(0.0, 1.0) } else { u1 }
             })
             .collect();
         self.left_of(&line)
     }
 
-    fn left_of(&self, command: &[f64]) -> Left {
+    fn left_of(&self, command: &[f64]) -> Unbalanced {
         let target = self.seen(command);
         let scores: Vec<f64> = self.forces.iter().map(|force| product(force, &target)).collect();
         let x = self.factor.solve(&scores);
@@ -124,7 +124,7 @@ impl<'a> Balance<'a> {
         // The part that least squares take off is the scores along the solution.
         let taken: f64 = x.iter().zip(&scores).map(|(x, score)| x * score).sum();
         let inertia = x[0] * x[0] * product(&self.forces[0], &self.forces[0]);
-        Left { part: (1.0 - taken / whole).max(0.0), by_inertia: inertia / whole }
+        Unbalanced { part: (1.0 - taken / whole).max(0.0), by_inertia: inertia / whole }
     }
 }
 

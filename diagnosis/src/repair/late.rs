@@ -2,7 +2,7 @@
 //! that more than a row of this is the log's; a force that acts late is the machine's, or a reading
 //! that is logged late, and a law of the library.
 
-use super::balance::{self, Balance, Left};
+use super::balance::{self, Balance, Unbalanced};
 use crate::data::recording::Recording;
 use crate::data::rig::Rig;
 use numerics::parallel;
@@ -45,10 +45,10 @@ fn alone(recording: &Recording, rig: &Rig) -> Option<usize> {
     let rate = recording.rate_hz();
     let most = ((LONGEST_S * rate) as usize).min(MOST_ROWS) as i32;
     let balance = Balance::new(recording, rig)?;
-    let left = |rows: i32| balance.left(f64::from(rows) / rate);
-    let by_skew = (-SKEW_ROWS..=SKEW_ROWS).map(left).map(|left| left.part).fold(f64::INFINITY, f64::min);
-    let (rows, Left { part, by_inertia }) =
-        (-most..=most).map(|rows| (rows, left(rows))).min_by(|a, b| a.1.part.total_cmp(&b.1.part))?;
+    let left_at = |rows: i32| balance.left(f64::from(rows) / rate);
+    let by_skew = (-SKEW_ROWS..=SKEW_ROWS).map(left_at).map(|left| left.part).fold(f64::INFINITY, f64::min);
+    let (rows, Unbalanced { part, by_inertia }) =
+        (-most..=most).map(|rows| (rows, left_at(rows))).min_by(|a, b| a.1.part.total_cmp(&b.1.part))?;
     let is_decisive = part < DECISIVE * by_skew && part < UNDERSTOOD && by_inertia > BY_INERTIA;
     (rows < -SKEW_ROWS && rows > -most && is_decisive).then_some(-rows as usize)
 }

@@ -28,13 +28,13 @@ mod tests {
 
     #[test]
     fn two_ways_are_two_in_different_recordings_as_well() {
-        let of = |place: fn(f64) -> f64| Recording {
+        let recording = |place: fn(f64) -> f64| Recording {
             position_counts: (0..2000).map(|row| place(f64::from(row) * 2e-3).round()).collect(),
             ..Recording::default()
         };
-        let trembling = of(|t| 2000.0 * t + 3.0 * (t * 12_989.8).sin());
-        assert!(back(&[&trembling, &of(|t| 500.0 * t * t)]).is_some());
-        assert!(back(&[&trembling, &of(|t| -2000.0 * t)]).is_none());
-        assert!(back(&[&of(|t| 1000.0 * (t - 0.3).powi(2))]).is_none());
+        let trembling = recording(|t| 2000.0 * t + 3.0 * (t * 12_989.8).sin());
+        assert!(back(&[&trembling, &recording(|t| 500.0 * t * t)]).is_some());
+        assert!(back(&[&trembling, &recording(|t| -2000.0 * t)]).is_none());
+        assert!(back(&[&recording(|t| 1000.0 * (t - 0.3).powi(2))]).is_none());
     }
 }

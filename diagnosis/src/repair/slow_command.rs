@@ -11,7 +11,7 @@ use numerics::parallel;
 const FEWEST: usize = 20;
 /// Part of the gaps between new values that are of the usual length, and how far they may be from
 /// it, as a part of it.
-const MOST: f64 = 0.9;
+const USUAL_PART: f64 = 0.9;
 const NEAR: f64 = 0.25;
 /// Part of what the command as it is held leaves of its variance that one which goes straight from
 /// value to value may leave: a drive that holds its command moves its axis by steps of force, and
@@ -49,7 +49,7 @@ fn rhythm(command: &[f64]) -> Option<Vec<usize>> {
     let usual = *sorted.get(sorted.len() / 2)?;
     let is_near = |gap: &&usize| gap.abs_diff(usual) as f64 <= NEAR * usual as f64;
     let near = gaps.iter().filter(is_near).count();
-    (usual > 1 && gaps.len() >= FEWEST && near as f64 >= MOST * gaps.len() as f64).then_some(rows)
+    (usual > 1 && gaps.len() >= FEWEST && near as f64 >= USUAL_PART * gaps.len() as f64).then_some(rows)
 }
 
 #[cfg(test)]

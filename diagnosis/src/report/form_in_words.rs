@@ -4,7 +4,7 @@ use crate::laws::{ForceTable, Variable};
 use numerics::digits::short;
 
 /// Part of a form's mean square that counts as all of it, in words.
-const MOST: f64 = 0.85;
+const NEARLY_ALL: f64 = 0.85;
 /// Part of the mean square that proportion to speed must explain to be reported as such: a square
 /// of the speed has 0.94.
 const PROPORTIONAL: f64 = 0.97;
@@ -52,16 +52,16 @@ pub(super) fn sentence(table: &ForceTable, visits: &[f64], length: &str) -> Stri
     let (forward, backward) = whole.halves();
     let (ahead, back) = (forward.square(), backward.square());
     let share = ahead / (ahead + back).max(1e-300);
-    let (way, end, sheet) = if share > MOST {
+    let (way, end, sheet) = if share > NEARLY_ALL {
         (forward.sense(1.0), ", forward only", forward)
-    } else if share < 1.0 - MOST {
+    } else if share < 1.0 - NEARLY_ALL {
         (backward.sense(-1.0), ", backward only", backward)
     } else {
         let (odd, even) = (forward.with(&backward, -1.0), forward.with(&backward, 1.0));
         let whole = odd.square() + even.square();
-        if odd.square() > MOST * whole {
+        if odd.square() > NEARLY_ALL * whole {
             (odd.sense(1.0), "", odd)
-        } else if even.square() > MOST * whole {
+        } else if even.square() > NEARLY_ALL * whole {
             ("", ", the same in both directions", even)
         } else {
             ("", ", not the same in both directions", forward)
@@ -165,10 +165,10 @@ impl Sheet {
             return along(Variable::Speed, &self.columns, &by_speed, length);
         };
         let by_other = self.by_row();
-        if self.explained(|_, j| by_speed[j].0) > MOST {
+        if self.explained(|_, j| by_speed[j].0) > NEARLY_ALL {
             return along(Variable::Speed, &self.columns, &by_speed, length);
         }
-        if self.explained(|i, _| by_other[i].0) > MOST {
+        if self.explained(|i, _| by_other[i].0) > NEARLY_ALL {
             return along(other, &self.rows, &by_other, length);
         }
         let (a, b) = self.product();
@@ -333,63 +333,66 @@ mod tests {
 
     #[test]
     fn forms_over_the_speed_read_as_an_engineer_writes() {
-        let of = |force: &dyn Fn(f64, f64) -> f64| told(None, |_, v, way| force(v, way));
-        assert_eq!(of(&|v, _| -v * v.abs()), "a force against the motion that grows with speed");
+        let words = |force: &dyn Fn(f64, f64) -> f64| told(None, |_, v, way| force(v, way));
+        assert_eq!(words(&|v, _| -v * v.abs()), "a force against the motion that grows with speed");
         assert_eq!(
-            of(&|v, _| -2.0 * v),
+            words(&|v, _| -2.0 * v),
             "a force against the motion that grows in proportion to speed, as viscous friction does"
         );
         assert_eq!(
-            of(&|v, way| -way * (0.2 + (-v.abs()).exp())),
+            words(&|v, way| -way * (0.2 + (-v.abs()).exp())),
             "a force against the motion that falls as speed grows"
         );
-        assert_eq!(of(&|_, way| -way), "a force against the motion that is much the same whatever the speed");
-        assert_eq!(of(&|v, _| (1.3 * v).sin()), "a force that swings with speed, turning 4 times");
         assert_eq!(
-            of(&|v, way| -way * (-(v.abs() - 4.0).powi(2)).exp()),
+            words(&|_, way| -way),
+            "a force against the motion that is much the same whatever the speed"
+        );
+        assert_eq!(words(&|v, _| (1.3 * v).sin()), "a force that swings with speed, turning 4 times");
+        assert_eq!(
+            words(&|v, way| -way * (-(v.abs() - 4.0).powi(2)).exp()),
             "a force against the motion that peaks at a speed of 4.000 rad/s"
         );
         assert_eq!(
-            of(&|v, way| if way > 0.0 { -v } else { 0.0 }),
+            words(&|v, way| if way > 0.0 { -v } else { 0.0 }),
             "a force against the motion that grows in proportion to speed, as viscous friction does, forward only"
         );
     }
 
     #[test]
     fn forms_over_two_variables_are_described_by_those_that_matter() {
-        let of =
+        let words =
             |force: &dyn Fn(f64, f64, f64) -> f64| told(Some((Variable::Travel, line(0.0, 5.0, 11))), force);
         assert_eq!(
-            of(&|x, v, way| if way > 0.0 { -x * v } else { 0.0 }),
+            words(&|x, v, way| if way > 0.0 { -x * v } else { 0.0 }),
             "a force against the motion that grows with speed times travel, forward only"
         );
-        assert_eq!(of(&|x, _, _| -x), "a force that grows with travel, the same in both directions");
+        assert_eq!(words(&|x, _, _| -x), "a force that grows with travel, the same in both directions");
         assert_eq!(
-            of(&|x, v, _| -v * (0.1 + (-4.0 * (x - 2.0).powi(2)).exp())),
+            words(&|x, v, _| -v * (0.1 + (-4.0 * (x - 2.0).powi(2)).exp())),
             "a force against the motion that grows with speed, by a factor that peaks at a travel of 2.000 rad"
         );
         assert_eq!(
-            of(&|_, v, _| -v),
+            words(&|_, v, _| -v),
             "a force against the motion that grows in proportion to speed, as viscous friction does"
         );
-        assert!(of(&|x, v, _| (3.0 * x * v).sin()).contains("in no simple form"));
+        assert!(words(&|x, v, _| (3.0 * x * v).sin()).contains("in no simple form"));
     }
 
     #[test]
     fn forms_without_a_speed_are_given_along_their_variable() {
-        let of = |over: Vec<Variable>, grid: Vec<Vec<f64>>, force: Vec<f64>| {
+        let words = |over: Vec<Variable>, grid: Vec<Vec<f64>>, force: Vec<f64>| {
             let visits = vec![1.0; force.len()];
             sentence(&ForceTable { over, grid, force }, &visits, "m")
         };
         let places = line(0.0, 1.0, 21);
         let bump = places.iter().map(|x| (-50.0 * (x - 0.5).powi(2)).exp()).collect();
         assert_eq!(
-            of(vec![Variable::Travel], vec![places.clone()], bump),
+            words(vec![Variable::Travel], vec![places.clone()], bump),
             "a force that peaks at a travel of 0.5000 m"
         );
         let fades = places.iter().flat_map(|t| [-1.0, 0.0, 1.0].map(|u| -u * t)).collect();
         assert_eq!(
-            of(vec![Variable::Time, Variable::Command], vec![places, vec![-1.0, 0.0, 1.0]], fades),
+            words(vec![Variable::Time, Variable::Command], vec![places, vec![-1.0, 0.0, 1.0]], fades),
             "a part of the command's force that grows with time"
         );
     }

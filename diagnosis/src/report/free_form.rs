@@ -90,9 +90,9 @@ pub(crate) fn draw(out: &mut String, shape: &Shape, told: &FreeForm, force: &str
         );
     }
     out.push_str("</p><figure>");
-    let all = || lines.iter().flat_map(|line| line.places.iter().copied());
-    let (low, high) = all().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), p| (a.min(p.0), b.max(p.0)));
-    let top = all().map(|p| p.1.abs() + p.2).fold(1e-300, f64::max);
+    let places = || lines.iter().flat_map(|line| line.places.iter().copied());
+    let (low, high) = places().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), p| (a.min(p.0), b.max(p.0)));
+    let top = places().map(|p| p.1.abs() + p.2).fold(1e-300, f64::max);
     let x_label = format!("{}, {}", variable.in_words(), unit(variable, kind));
     let at = frame(out, (low, high), (-top, top), &x_label, &format!("force, {force}"));
     for (k, line) in lines.iter().enumerate() {

@@ -60,9 +60,9 @@ pub(super) fn draw(out: &mut String, compared: &Comparison, wanted: &[&str], com
         (coherence, "coherence", Some((0.0, 1.05))),
     ];
     for (quantity, label, range) in quantities {
-        let all =
+        let values =
             || found.recorded.iter().chain(models.iter().flat_map(|(_, bands)| bands)).filter_map(quantity);
-        let (low, high) = all().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
+        let (low, high) = values().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
         if low > high {
             continue;
         }

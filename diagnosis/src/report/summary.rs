@@ -83,7 +83,7 @@ impl Outcome {
         }
         if let Some(simulation) = &r.simulation {
             let named = |name: &str, x: Option<f64>| x.map(|x| format!("{name} {}", short(x)));
-            let of = |m: &ByModel| {
+            let of_each = |m: &ByModel| {
                 let all = [named("nominal", m.nominal), named("refit", m.refit), named("patched", m.patched)];
                 all.into_iter().flatten().collect::<Vec<_>>().join(", ")
             };
@@ -92,14 +92,14 @@ impl Outcome {
                     out,
                     "  held-out position RMSE, windows of {} s: {} {}",
                     window.seconds,
-                    of(&window.position),
+                    of_each(&window.position),
                     simulation.unit
                 );
             }
             let _ = writeln!(
                 out,
                 "  held-out position RMSE, free run: {} {}",
-                of(&simulation.free_run),
+                of_each(&simulation.free_run),
                 simulation.unit
             );
             if let Some(worse) = &simulation.worse {

@@ -2,7 +2,7 @@
 //! the headline. Nothing reads one to decide.
 
 use crate::decide::diagnosis::Reason;
-use crate::decide::rejection::{Rather, Rejection, Weakness};
+use crate::decide::rejection::{BetterExplanation, Rejection, Weakness};
 use crate::decide::thresholds::{CERTAIN_Z, LEAST_SHARE, MATERIAL, SURE_Z, UNLIKELY_Z, UNSURE_SHARE};
 use crate::propose::untested::NotTested;
 use numerics::bootstrap::Gain;
@@ -45,7 +45,7 @@ pub(crate) fn rejection(why: &Rejection) -> String {
         Rejection::Creeps { part } => {
             format!("it would bend over {:.0} % of the travel, as a spring that creeps does", 100.0 * part)
         }
-        Rejection::Rather(what) => rather(what),
+        Rejection::BetterExplanation(what) => rather(what),
         Rejection::BesideUnknown => "a larger effect in the same model is not in the library".into(),
         Rejection::Undecided => "more effects explain it as well than a class may hold".into(),
         Rejection::Improbable { probability, weakness: weakest } => {
@@ -87,10 +87,10 @@ fn not_sure(fit_z: f64, holdout_z: f64, share: f64) -> String {
     )
 }
 
-fn rather(what: &Rather) -> String {
+fn rather(what: &BetterExplanation) -> String {
     match what {
-        Rather::Unnamed { what } => format!("{what} would explain more"),
-        Rather::FreeForm { over, form, effect } => {
+        BetterExplanation::Unnamed { what } => format!("{what} would explain more"),
+        BetterExplanation::FreeForm { over, form, effect } => {
             let own = if *effect > 0.0 { format!("{effect:.0}") } else { "nothing".to_owned() };
             format!(
                 "a free-form force over {} gains {form:.0} nats on left-out blocks, and it gains {own}",
@@ -108,7 +108,7 @@ fn weakness(weakest: &Weakness) -> String {
         Weakness::SmallShare { share } => {
             format!("it explains {:.1} % of what the noise leaves", 100.0 * share)
         }
-        Weakness::LeftOver { part } => {
+        Weakness::Unexplained { part } => {
             format!("{:.0} % of what the refit leaves beyond chance remains with it", 100.0 * part)
         }
     }
@@ -172,7 +172,7 @@ pub(crate) fn reason(why: &Reason, form: Option<&str>) -> String {
         Reason::Resembles { effect, rather: what } => {
             format!("it resembles {}, but {}", effect.in_words(), rather(what))
         }
-        Reason::Foreign(foreign) => {
+        Reason::UnnamedPhysics(foreign) => {
             format!("{} would explain {:.0} % of it", foreign.what, 100.0 * foreign.share)
         }
         Reason::FreeForm => return format!("{} would explain it", form.unwrap_or("a force of some form")),

@@ -85,6 +85,27 @@ pub struct Comparison {
     pub response: Option<FrequencyResponse>,
 }
 
+impl Simulated {
+    /// Runs a model beside a recording; `feedback` is the loop that ran, if it was recognised, and
+    /// `windows` are lengths in s.
+    fn new(name: &str, rig: &Rig, beside: &Beside, feedback: Option<PositionLoop>, windows: &[f64]) -> Self {
+        let free = beside.free_run(rig);
+        let under = feedback.map(|feedback| beside.under_reference(rig, feedback));
+        let whole = beside.motion.seconds();
+        let windows = windows.iter().copied().filter(|seconds| *seconds <= whole);
+        let figures = Figures {
+            free_run: free.deviation(&beside.motion).into(),
+            windows: windows
+                .map(|seconds| Window { seconds, off: beside.windows(rig, seconds).into() })
+                .collect(),
+            under_reference: under.as_ref().map(|u| u.deviation(&beside.motion).into()),
+            start: beside.start,
+        };
+        let afresh = (whole > 2.0 * AFRESH_S).then(|| beside.started_every(rig, AFRESH_S));
+        Self { model: name.to_owned(), free, afresh, under, force: beside.force(rig), figures }
+    }
+}
+
 impl Comparison {
     /// Runs every model and compares it with a recording; the first names kind, resolution and
     /// inertia. `windows` are lengths in s.
@@ -100,23 +121,7 @@ impl Comparison {
                 true => Beside::in_motion(recording, motion.clone(), rig),
                 false => Beside::new(recording, rig),
             };
-            let free = beside.free_run(rig);
-            let under = feedback.map(|feedback| beside.under_reference(rig, feedback));
-            let whole = beside.motion.seconds();
-            let windows = windows
-                .iter()
-                .copied()
-                .filter(|seconds| *seconds <= whole)
-                .map(|seconds| Window { seconds, off: beside.windows(rig, seconds).into() })
-                .collect();
-            let figures = Figures {
-                free_run: free.deviation(&beside.motion).into(),
-                windows,
-                under_reference: under.as_ref().map(|u| u.deviation(&beside.motion).into()),
-                start: beside.start,
-            };
-            let afresh = (whole > 2.0 * AFRESH_S).then(|| beside.started_every(rig, AFRESH_S));
-            Simulated { model: name.clone(), free, afresh, under, force: beside.force(rig), figures }
+            Simulated::new(name, rig, &beside, feedback, windows)
         };
         let models: Vec<Simulated> = parallel::map_all(models, simulated);
         let positions: Vec<(&str, &[f64])> =

@@ -40,12 +40,12 @@ impl FrequencyResponse {
         let at: Vec<f64> = (0..rows).map(|i| i as f64 * step).collect();
         let middles: Vec<f64> = at.iter().map(|t| t + 0.5 * step).collect();
         let command = cells(&motion.time, &recording.command, &middles, step);
-        let of = |position: &[f64]| {
+        let response_to = |position: &[f64]| {
             let even = cubic(&motion.time, position, &at);
             let speed: Vec<f64> = even.windows(2).map(|pair| (pair[1] - pair[0]) / step).collect();
             response(&command, &speed, 1.0 / step)
         };
-        let recorded = of(&motion.position);
+        let recorded = response_to(&motion.position);
         let most = recorded.iter().map(|band| band.input).fold(0.0, f64::max);
         let shows = |band: &Band| {
             let [re, im] = band.response;
@@ -64,7 +64,7 @@ impl FrequencyResponse {
         let models = models
             .iter()
             .map(|(name, position)| {
-                let bands = if stays(position) { excited(of(position)) } else { Vec::new() };
+                let bands = if stays(position) { excited(response_to(position)) } else { Vec::new() };
                 ((*name).to_owned(), bands)
             })
             .collect();

@@ -127,8 +127,8 @@ impl<'a> Beside<'a> {
     }
 
     fn around(&self, i: usize) -> Surroundings {
-        let at = |column: &Option<Vec<f64>>| column.as_ref().map_or(0.0, |c| c[i]);
-        Surroundings { tilt: at(&self.recording.tilt_rad), external: at(&self.recording.force) }
+        let value = |column: &Option<Vec<f64>>| column.as_ref().map_or(0.0, |c| c[i]);
+        Surroundings { tilt: value(&self.recording.tilt_rad), external: value(&self.recording.force) }
     }
 
     fn whole(&self, rig: &Rig, feedback: Option<PositionLoop>) -> Trajectory {

@@ -66,8 +66,8 @@ fn values(rig: &Rig) -> Vec<Value> {
 }
 
 fn residuals(rig: &Rig, besides: &[Beside], seconds: f64) -> Vec<f64> {
-    let of = |beside: &Beside| beside.off(rig, seconds, beside.motion.time.len().div_ceil(MOST_ROWS).max(1));
-    besides.iter().flat_map(of).collect()
+    let every = |beside: &Beside| beside.motion.time.len().div_ceil(MOST_ROWS).max(1);
+    besides.iter().flat_map(|beside| beside.off(rig, seconds, every(beside))).collect()
 }
 
 /// Lengths of the windows of one stage after the other, s: a wrong value leads a long run so far
@@ -94,17 +94,17 @@ fn stage(rig: &Rig, besides: &[Beside], force: f64, seconds: f64) -> Rig {
             if own > 0.0 { own } else { 0.02 * force.max(1e-12) }
         })
         .collect();
-    let at = |theta: &[f64]| {
+    let rig_at = |theta: &[f64]| {
         let mut out = rig.clone();
         for ((value, scale), theta) in moved.iter().zip(&scale).zip(theta) {
             set(&mut out, value, get(rig, value) + scale * theta);
         }
         out
     };
-    let usable = |theta: &[f64]| at(theta).model.inertia > 0.05 * rig.model.inertia;
-    let off = |theta: &[f64]| residuals(&at(theta), besides, seconds);
+    let usable = |theta: &[f64]| rig_at(theta).model.inertia > 0.05 * rig.model.inertia;
+    let off = |theta: &[f64]| residuals(&rig_at(theta), besides, seconds);
     let (start, at_start) = (vec![0.0; moved.len()], residuals(rig, besides, seconds));
-    at(&least_squares((start, at_start), &off, &usable))
+    rig_at(&least_squares((start, at_start), &off, &usable))
 }
 
 /// Half the Hessian of the sum of squares and half its negative gradient, from derivatives by

@@ -197,9 +197,9 @@ fn a_load_step_is_no_drift_and_the_report_names_its_likeness() {
         // In open loop it is reported by its time or, where no drift replaces it, by its inputs;
         // under a loop gain and friction are both seen to change, alike.
         let told = &outcome.report.sentence;
-        let is_told = told.contains("at once, at 5.4 s")
+        let is_reported = told.contains("at once, at 5.4 s")
             || told.contains("a part of the command's force that falls as time grows");
-        assert!(closed || is_told, "{}", outcome.summary());
+        assert!(closed || is_reported, "{}", outcome.summary());
     }
 }
 

@@ -3,7 +3,7 @@
 
 use super::shared::Shared;
 use crate::log;
-use crate::monitor::{Asked, DriveMonitor};
+use crate::monitor::{DriveMonitor, DriveRequest};
 use crate::port::{Board, ReadDrive, SupplyLevel, Watchdog};
 use crate::reset::{Crash, CrashKind};
 use crate::supervision::Supervisor;
@@ -54,7 +54,7 @@ impl<B: Board> Watch<B> {
         let readings = lines.read();
         self.shared
             .set_fitted(Sensors { encoder_supply: wires.supply_sensed, current: readings.current.is_some() });
-        let verdict = monitor.look(&readings, Asked { powered, code: self.shared.given() });
+        let verdict = monitor.look(&readings, DriveRequest { powered, code: self.shared.given() });
         for (interlock, is_on) in verdict.conditions() {
             self.shared.conditions.set(interlock, is_on);
         }

@@ -52,7 +52,7 @@ pub trait Line {
 }
 
 /// The conversation.
-pub struct Bench<'a> {
+pub struct DeviceDialogue<'a> {
     line: &'a mut dyn Line,
     driver: Driver,
     now: Duration,
@@ -64,7 +64,7 @@ pub struct Bench<'a> {
     played_ticks: usize,
 }
 
-impl<'a> Bench<'a> {
+impl<'a> DeviceDialogue<'a> {
     /// Says hello and waits until the device listens.
     pub async fn open(line: &'a mut dyn Line) -> Result<Self, Error> {
         let mut driver = Driver::new(Patient::nobody());

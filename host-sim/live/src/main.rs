@@ -1,7 +1,7 @@
 //! The program of the first command, `cargo run --release`: it has what shows a device, and hands
 //! every other command to `host-sim`, which has them all and takes longer to build.
 
-mod whole;
+mod delegate;
 
 use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
@@ -15,11 +15,11 @@ struct Line {
     #[command(flatten)]
     options: Options,
     #[command(subcommand)]
-    command: Option<Asked>,
+    command: Option<CommandLine>,
 }
 
 #[derive(Subcommand)]
-enum Asked {
+enum CommandLine {
     #[command(flatten)]
     Live(Command),
     #[command(external_subcommand)]
@@ -30,17 +30,17 @@ enum Asked {
 fn main() -> ExitCode {
     let parsed = live::parse::<Line>();
     let is_for_the_whole = match &parsed {
-        Ok(line) => matches!(line.command, Some(Asked::Other(_))),
+        Ok(line) => matches!(line.command, Some(CommandLine::Other(_))),
         // The help of all commands; that of one of ours is here.
         Err(error) => error.kind() == ErrorKind::DisplayHelp && !names_one_of_ours(),
     };
     if is_for_the_whole {
-        return whole::run();
+        return delegate::run();
     }
     live::finish(parsed, |line| {
         line.options.apply();
         match line.command {
-            Some(Asked::Live(command)) => command.run(),
+            Some(CommandLine::Live(command)) => command.run(),
             _ => Command::usual().run(),
         }
     })

@@ -115,7 +115,7 @@ fn every_feature_of_the_whole_program_is_handed_on() {
             .collect()
     };
     let (whole, own, handed) =
-        (features(&read("../Cargo.toml")), features(&read("Cargo.toml")), read("src/whole.rs"));
+        (features(&read("../Cargo.toml")), features(&read("Cargo.toml")), read("src/delegate.rs"));
     for name in &whole {
         assert!(own.contains(name) && handed.contains(&format!("(\"{name}\", cfg!")), "{name}: {own:?}");
     }

@@ -1,5 +1,5 @@
-//! Whom the needle goes into during a run, and changing it: what a person edits in the page becomes
-//! a checked profile, is asked of the device, and counts once the device has taken it whole. It
+//! Validates and applies patient changes during a run. An edit in the page becomes a checked
+//! profile, is requested from the device, and counts once the device has accepted all of it. It
 //! sends nothing itself.
 
 use crate::saved_patients::SavedPatients;
@@ -21,12 +21,12 @@ pub struct PatientManager {
     procedure: Option<String>,
     setup: Setup,
     saved: Option<SavedPatients>,
-    asked: Option<Asked>,
+    asked: Option<RequestedPatient>,
 }
 
 /// A patient that the device has been asked to take.
 #[derive(Clone, Debug)]
-struct Asked {
+struct RequestedPatient {
     profile: Profile,
     /// The procedure of the scripted hand in it, if it differs from the default.
     procedure: Option<String>,
@@ -88,7 +88,7 @@ impl PatientManager {
         let wanted = procedure.as_ref().or(self.procedure.as_ref());
         wanted.into_iter().try_for_each(|wanted| hand(wanted, &profile).map(drop))?;
         let patient = profile.config.patient.clone();
-        self.asked = Some(Asked { profile, procedure, save_as });
+        self.asked = Some(RequestedPatient { profile, procedure, save_as });
         Ok(patient)
     }
 
@@ -114,7 +114,7 @@ impl PatientManager {
     /// that was to be saved is written: the answer has the file, or the reason why it could not be
     /// written.
     pub fn taken(&mut self) -> Option<PatientAnswer> {
-        let Asked { mut profile, procedure, save_as } = self.asked.take()?;
+        let RequestedPatient { mut profile, procedure, save_as } = self.asked.take()?;
         let mut answer = PatientAnswer { taken: true, ..PatientAnswer::default() };
         if let (Some(saved), Some(name)) = (&self.saved, save_as) {
             match saved.write(&name, &format!("# Edited and saved in the page.\n{}", profile.source.text)) {

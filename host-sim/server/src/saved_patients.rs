@@ -10,7 +10,7 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 /// Patients that a list shows; a folder may have more files.
-const MOST: usize = 200;
+const MOST_LISTED: usize = 200;
 /// Size of the largest file taken, in bytes: an edited patient with all its layers has about 3,000.
 const LARGEST: u64 = 65_536;
 /// Files of one name, distinguished by a number.
@@ -31,7 +31,8 @@ impl SavedPatients {
     /// Returns their names, in order.
     pub fn names(&self) -> Vec<String> {
         let entries = fs::read_dir(&self.folder).into_iter().flatten().flatten();
-        let mut names: Vec<String> = entries.filter_map(|entry| name_of(&entry.path())).take(MOST).collect();
+        let mut names: Vec<String> =
+            entries.filter_map(|entry| name_of(&entry.path())).take(MOST_LISTED).collect();
         names.sort();
         names
     }

@@ -22,7 +22,7 @@ const PLOTTED: usize = 150;
 pub(super) fn serve(files: Vec<PathBuf>, out: PathBuf, port: u16) -> Result<(), Error> {
     let stop = Arc::new(AtomicBool::new(false));
     stop_on_signals(&stop)?;
-    let bench = Arc::new(Bench { out, state: Mutex::new(State { files, ..State::default() }) });
+    let bench = Arc::new(ImportPage { out, state: Mutex::new(State { files, ..State::default() }) });
     let answer = Arc::new(move |what: &str, body: &[u8]| bench.answer(what, body));
     let server = visualizer::serve_workbench(answer, port).map_err(Error::failed)?;
     live::output::page("drop a log on the page", &server.url());
@@ -43,14 +43,14 @@ struct State {
     report: Option<Result<String, String>>,
 }
 
-struct Bench {
+struct ImportPage {
     out: PathBuf,
     state: Mutex<State>,
 }
 
 /// The choices of the page.
 #[derive(Deserialize)]
-struct Asked {
+struct ImportChoices {
     /// As `--column` has them.
     columns: Vec<String>,
     rate_hz: Option<f64>,
@@ -64,7 +64,7 @@ fn read<'a, T: Deserialize<'a>>(body: &'a [u8]) -> Result<T, Error> {
         .map_err(|cause| Error::input(format_args!("the page asked oddly ({cause}); load it again")))
 }
 
-impl Bench {
+impl ImportPage {
     fn state(&self) -> MutexGuard<'_, State> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -129,7 +129,7 @@ impl Bench {
     }
 
     /// Imports the files by what the page says of the columns; the rig as it was written.
-    fn read(&self, asked: &Asked) -> Result<Value, Error> {
+    fn read(&self, asked: &ImportChoices) -> Result<Value, Error> {
         let columns = asked.columns.iter().map(|text| import::choice(text)).collect::<Result<_, _>>()?;
         let request = Request {
             files: self.state().files.clone(),

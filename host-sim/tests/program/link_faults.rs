@@ -10,13 +10,13 @@ use link::frames::{DeviceFrame, EventKind};
 use std::time::Duration;
 
 /// A device and a PC with a cable between them that a test may spoil.
-struct Bench {
+struct SpoiltLink {
     device: VirtualDevice,
     driver: Driver,
     frames: Vec<DeviceFrame>,
 }
 
-impl Bench {
+impl SpoiltLink {
     fn new() -> Self {
         let profile = Profile::find("adult").expect("it is built in");
         let procedure = Procedure::find("venepuncture", &profile).expect("it is built in");
@@ -74,7 +74,7 @@ impl Bench {
 
 #[test]
 fn a_device_stays_off_until_started_and_on_with_heartbeats() {
-    let mut bench = Bench::new();
+    let mut bench = SpoiltLink::new();
     bench.run(1_000, |_| {});
     assert!(bench.driver.is_ready(bench.now()) && !bench.device.is_enabled());
     bench.driver.start();
@@ -88,7 +88,7 @@ fn a_device_stays_off_until_started_and_on_with_heartbeats() {
 
 #[test]
 fn torque_ends_with_the_pc_and_does_not_return_with_it() {
-    let mut bench = Bench::new();
+    let mut bench = SpoiltLink::new();
     bench.start();
     // Into the skin, so that there is torque to lose.
     bench.run(2_100, |_| {});
@@ -120,7 +120,7 @@ fn torque_ends_with_the_pc_and_does_not_return_with_it() {
 
 #[test]
 fn a_pulled_cable_takes_the_torque_at_once() {
-    let mut bench = Bench::new();
+    let mut bench = SpoiltLink::new();
     bench.start();
     bench.device.disconnect();
     bench.tick_alone(1);
@@ -130,7 +130,7 @@ fn a_pulled_cable_takes_the_torque_at_once() {
 
 #[test]
 fn a_pc_that_restarts_while_torque_is_on_stops_the_device_first() {
-    let mut bench = Bench::new();
+    let mut bench = SpoiltLink::new();
     bench.start();
     let profile = Profile::find("thin-elderly").expect("it is built in");
     bench.driver = Driver::new(profile.config.patient.clone());
@@ -147,7 +147,7 @@ fn a_pc_that_restarts_while_torque_is_on_stops_the_device_first() {
 
 #[test]
 fn commands_get_through_a_bad_cable_and_every_loss_is_counted() {
-    let mut bench = Bench::new();
+    let mut bench = SpoiltLink::new();
     let mut random = 1_u64;
     let mut spoiled = 0;
     let mut spoil = |bytes: &mut Vec<u8>| {
@@ -179,9 +179,9 @@ fn commands_get_through_a_bad_cable_and_every_loss_is_counted() {
 
 #[test]
 fn a_device_that_loses_power_is_greeted_anew_and_stays_off() {
-    let mut bench = Bench::new();
+    let mut bench = SpoiltLink::new();
     bench.start();
-    let fresh = Bench::new();
+    let fresh = SpoiltLink::new();
     let ticks = bench.device.ticks();
     bench.device = fresh.device;
     // The clock of the bench is the device's: bring it to where it was.

@@ -217,7 +217,7 @@ fn no_command_raises_a_ceiling() {
 
 /// `host-sim commission` at the end of the emulated cable, with a hand that does what a person is
 /// asked.
-struct Bench {
+struct CommissionedBoard {
     board: Board,
     needle: Needle,
     /// The position at which the hand stops, in m.
@@ -230,7 +230,7 @@ struct Bench {
 const ROLLER_MM: f64 = 10.0;
 const HAND_SPEED: f64 = 0.06;
 
-impl Bench {
+impl CommissionedBoard {
     fn new(reversed: bool, wires: Wires) -> Self {
         Self::on(Wiring { commissioned: false, ..Wiring::default() }, reversed, wires)
     }
@@ -255,7 +255,7 @@ impl Bench {
     }
 }
 
-impl Line for Bench {
+impl Line for CommissionedBoard {
     fn exchange(&mut self, out: &[u8], into: &mut Vec<u8>) -> Result<Duration, Error> {
         let out = out.to_vec();
         self.board.at_stop(move |stopped| stopped.usb().host.write(&out));
@@ -306,7 +306,7 @@ impl Line for Bench {
 #[test]
 fn a_device_is_commissioned_over_its_cable_and_keeps_its_record() {
     for reversed in [false, true] {
-        let mut bench = Bench::new(reversed, Wires::default());
+        let mut bench = CommissionedBoard::new(reversed, Wires::default());
         let (outcome, _) = bench.commission();
         let outcome = outcome.unwrap_or_else(|why| panic!("leads reversed {reversed}: {why}"));
         assert_eq!(outcome.leads_reversed, reversed);
@@ -339,7 +339,7 @@ fn a_device_is_commissioned_over_its_cable_and_keeps_its_record() {
 #[test]
 fn a_dead_channel_is_named_before_the_motor_moves() {
     let wires = Wires { b: Wire::Stuck(false), ..Wires::default() };
-    let mut bench = Bench::new(false, wires);
+    let mut bench = CommissionedBoard::new(false, wires);
     let (outcome, has_moved) = bench.commission();
     let said = outcome.map(|outcome| outcome.lines()).expect_err("it does not pass").to_string();
     assert!(
@@ -359,7 +359,7 @@ fn a_dead_channel_is_named_before_the_motor_moves() {
 fn a_weight_on_the_needle_corrects_a_wrong_torque_constant() {
     let wish = WeighWish { grams: 100.0, correct: true };
     for gain in [0.5, 2.0] {
-        let mut bench = Bench::on(Wiring::default(), false, Wires::default());
+        let mut bench = CommissionedBoard::on(Wiring::default(), false, Wires::default());
         bench.needle.change(|state| state.gain = gain);
         let outcome = weigh(&mut bench, &wish, |_| Ok(())).unwrap_or_else(|why| panic!("{gain}: {why}"));
         let device = outcome.record.device;
@@ -373,7 +373,7 @@ fn a_weight_on_the_needle_corrects_a_wrong_torque_constant() {
         assert!((mass / 30.0 - 1.0).abs() < 0.15, "{gain}: {mass} g of 30");
     }
     let swapped = Wires { swapped: true, ..Wires::default() };
-    let mut bench = Bench::on(Wiring::default(), true, swapped);
+    let mut bench = CommissionedBoard::on(Wiring::default(), true, swapped);
     let why = weigh(&mut bench, &wish, |_| Ok(())).expect_err("the other way round").to_string();
     assert!(why.contains("outwards") && why.contains("commission again"), "{why}");
 }
@@ -383,9 +383,9 @@ fn a_weight_on_the_needle_corrects_a_wrong_torque_constant() {
 #[test]
 fn commissioning_sets_the_brown_out_reset_first() {
     const LEFT: &str = "left";
-    let mut bench = Bench::new(false, Wires::default());
+    let mut bench = CommissionedBoard::new(false, Wires::default());
     bench.board.flash().array().options = FACTORY_OPTIONS;
-    let steps_of = |bench: &mut Bench| {
+    let steps_of = |bench: &mut CommissionedBoard| {
         bench.board.at_stop(|stopped| stopped.reset_by_pin());
         bench.board.run_ms(50);
         open_port(&mut bench.board);

@@ -21,7 +21,7 @@ const AT_ONCE: Duration = Duration::from_millis(40);
 const MOCK: &str = include_str!("board_page.js");
 
 /// The page with its port, and the device behind it.
-struct Bench {
+struct PageWithDevice {
     page: Page,
     _browser: Chromium,
     scratch: PathBuf,
@@ -33,7 +33,7 @@ struct Bench {
     out: Vec<u8>,
 }
 
-impl Bench {
+impl PageWithDevice {
     fn open(name: &str) -> Result<Self, Error> {
         let places = Places::find()?;
         let site = places.target.join("site/board.html");
@@ -127,7 +127,7 @@ fn a_board_is_shown_and_commissioned_in_the_page() {
 }
 
 fn commission() -> Result<(), Error> {
-    let mut bench = Bench::open("page-board")?;
+    let mut bench = PageWithDevice::open("page-board")?;
     bench.page.photograph(&bench.scratch.join("closed.png"))?;
     let shown = bench.page.evaluate("document.getElementById('stop').offsetHeight > 0")?;
     check("Stop is always there", shown == json!(true), shown)?;
@@ -171,7 +171,7 @@ fn a_cable_that_is_pulled_forgets_the_guide() {
 }
 
 fn pull() -> Result<(), Error> {
-    let mut bench = Bench::open("page-board-pulled")?;
+    let mut bench = PageWithDevice::open("page-board-pulled")?;
     bench.connect()?;
     bench.page.click("commission")?;
     for step in 1..=ACTS.len() {
@@ -209,7 +209,7 @@ fn a_board_is_updated_in_the_page() {
 }
 
 fn update() -> Result<(), Error> {
-    let mut bench = Bench::open("page-board-update")?;
+    let mut bench = PageWithDevice::open("page-board-update")?;
     let mut bootloader = Bootloader::default();
     let file = dfuse(FLASH, &image());
     bench.page.evaluate(&format!("mock.choose({})", json!(file)))?;

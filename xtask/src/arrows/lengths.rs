@@ -2,7 +2,7 @@
 //! are formatted, so that a function ends at the first brace as far to the left as its own line.
 
 /// Most lines of a function, its signature and its last brace included.
-const MOST: usize = 60;
+const MOST_LINES: usize = 60;
 
 /// A function with its first line, from 1, and its number of lines.
 #[derive(Debug, PartialEq, Eq)]
@@ -40,7 +40,7 @@ fn longer<'a>(
     let one = |(i, line): (usize, &&'a str)| {
         let name = name_of(line)?;
         let lines = length(&lines[i..])?;
-        (lines > MOST).then(|| Function { name: name.to_owned(), line: i + 1, lines })
+        (lines > MOST_LINES).then(|| Function { name: name.to_owned(), line: i + 1, lines })
     };
     lines.iter().enumerate().filter_map(one).collect()
 }

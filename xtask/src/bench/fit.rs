@@ -1,8 +1,8 @@
 //! A fit of a rig's values to a recording, ours and SciPy's by turns.
 
+use super::end_to_end;
 use super::programs;
 use super::values::{Values, values_in};
-use super::whole;
 use crate::shell::{self, Error};
 use crate::workspace_build::built;
 use std::fs;
@@ -33,7 +33,7 @@ pub(crate) fn with_peer() -> Result<Values, Error> {
 fn prepared() -> Result<(PathBuf, PathBuf, PathBuf), Error> {
     let folder = shell::target().join("bench-recordings");
     if !folder.join("fit.csv").is_file() {
-        whole::recordings()?;
+        end_to_end::recordings()?;
     }
     let short = folder.join("fit-short.csv");
     shorten(&folder.join("fit.csv"), &short)?;

@@ -7,7 +7,7 @@ mod estimate;
 mod features;
 mod score_test;
 
-use crate::dynamics::Bench;
+use crate::dynamics::JudgeDynamics;
 use crate::generator::case::Case;
 use crate::key::{Category, Key};
 use crate::rng::Rng;
@@ -48,7 +48,7 @@ pub(crate) const BASELINES: [Baseline; 6] = [
 
 /// The fit that is given the whole structure, by the judge's inverse dynamics; none where there is
 /// nothing to gain, or the effect has no law with few enough numbers.
-pub(crate) fn known_structure(bench: &Result<Bench, String>, key: &Key) -> Option<Opinion> {
+pub(crate) fn known_structure(bench: &Result<JudgeDynamics, String>, key: &Key) -> Option<Opinion> {
     if !matches!(key.category, Category::Single | Category::Pair | Category::Triple) {
         return None;
     }

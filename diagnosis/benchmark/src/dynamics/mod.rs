@@ -14,4 +14,4 @@ mod rig;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use residual::Bench;
+pub(crate) use residual::JudgeDynamics;

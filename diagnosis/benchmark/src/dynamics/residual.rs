@@ -18,7 +18,7 @@ use crate::signal::Normal;
 use crate::tool::Paths;
 
 /// The files of a case in the oracle's band.
-pub(crate) struct Bench {
+pub(crate) struct JudgeDynamics {
     rig: Rig,
     fits: Vec<Band>,
     held: Band,
@@ -27,7 +27,7 @@ pub(crate) struct Bench {
     truth: f64,
 }
 
-impl Bench {
+impl JudgeDynamics {
     /// Reads rig and recordings.
     ///
     /// # Errors

@@ -3,13 +3,13 @@
 
 use std::fmt::Write as _;
 
-use super::Bench;
+use super::JudgeDynamics;
 use crate::generator::case::{Case, build};
 use crate::generator::clock::Stamping;
 use crate::generator::files;
 use crate::generator::spec::Spec;
 use crate::key::Category;
-use crate::report_residuals::Left;
+use crate::report_residuals::ResidualRms;
 
 /// A case of the effect on a machine whose stamps are true and that does not creep: of one that
 /// does, so few rows lie away from a reversal that they are not like the others.
@@ -53,15 +53,15 @@ fn true_rig(case: &Case, effects: &str) -> String {
     text + effects
 }
 
-fn judged(case: &Case, effects: &str) -> Result<Left, String> {
+fn judged(case: &Case, effects: &str) -> Result<ResidualRms, String> {
     let dir =
         std::env::temp_dir().join(format!("proof-dynamics-{}-{}", std::process::id(), case.spec.hidden[0]));
     let paths = files::write_case(case, &dir).unwrap();
     let patched = dir.join("patched-rig.toml");
     std::fs::write(&patched, true_rig(case, effects)).unwrap();
     let key = files::key(case);
-    let bench = Bench::new(&paths, &key).unwrap();
-    let left = bench.patched(&patched).map(|patched| Left { refit: bench.refit(), patched });
+    let bench = JudgeDynamics::new(&paths, &key).unwrap();
+    let left = bench.patched(&patched).map(|patched| ResidualRms { refit: bench.refit(), patched });
     std::fs::remove_dir_all(&dir).unwrap();
     left
 }

@@ -77,7 +77,7 @@ pub(crate) fn build(kind: Kind, m: &Machine, rng: &mut Rng) -> (Drive, Option<Lo
         Kind::HoldRamp if !m.rotary => Kind::Ladder,
         other => other,
     };
-    let bench = Bench::new(m, rng);
+    let bench = ExcitedMachine::new(m, rng);
     let drive = match kind {
         Kind::Staircase => bench.staircase(rng),
         Kind::Triangle => {
@@ -101,7 +101,7 @@ pub(crate) fn build(kind: Kind, m: &Machine, rng: &mut Rng) -> (Drive, Option<Lo
 }
 
 /// The machine with the numbers that its excitations share.
-struct Bench<'a> {
+struct ExcitedMachine<'a> {
     m: &'a Machine,
     /// Level of the dry friction, as a force.
     coulomb: f64,
@@ -115,7 +115,7 @@ struct Bench<'a> {
     top_hz: f64,
 }
 
-impl<'a> Bench<'a> {
+impl<'a> ExcitedMachine<'a> {
     fn new(m: &'a Machine, rng: &mut Rng) -> Self {
         let strongest = 0.45 * m.limit * m.plant.gain / m.plant.inertia;
         Self {

@@ -1,10 +1,10 @@
 //! One case: a carrier, an effect drawn for it, and the size at which it leaves what is asked for.
 
+use super::banded_recording::{BandedRecording, State, band};
 use super::carrier::Carrier;
 use super::conceal::{Changed, Concealed, conceal};
 use super::regress::{Block, Oracle, solve};
 use super::shapes::{self, HiddenLaw, Side};
-use super::sight::{Sight, State, band};
 use crate::dynamics::recording::Recording;
 use crate::rng::Rng;
 use crate::signal::rms;
@@ -23,7 +23,7 @@ pub(crate) struct Ground {
     pub(crate) carrier: Carrier,
     states: Vec<State>,
     /// Those of the recordings to fit on, in the band of the tool's force errors.
-    sights: Vec<Sight>,
+    sights: Vec<BandedRecording>,
 }
 
 /// A case that can be written.
@@ -40,7 +40,7 @@ impl Ground {
     /// `band_hz`: of the tool's force errors.
     pub(crate) fn new(carrier: Carrier, band_hz: f64) -> Self {
         let states = carrier.recordings().map(|r| State::of(r, &carrier.rig)).collect();
-        let sights = carrier.fits.iter().map(|r| Sight::of(r, &carrier.rig, band_hz)).collect();
+        let sights = carrier.fits.iter().map(|r| BandedRecording::of(r, &carrier.rig, band_hz)).collect();
         Self { carrier, states, sights }
     }
 
@@ -81,7 +81,7 @@ impl Ground {
     }
 
     /// The force that a changed recording has more, in the band.
-    fn force(&self, sight: &Sight, r: &Recording, changed: &Changed) -> Vec<f64> {
+    fn force(&self, sight: &BandedRecording, r: &Recording, changed: &Changed) -> Vec<f64> {
         let rig = &self.carrier.rig;
         if changed.error.is_empty() {
             return sight.see_rows(&changed.force(r, rig.gain));
@@ -150,7 +150,7 @@ impl Ground {
     fn oracle(&self, changed: &[Changed]) -> Oracle {
         let mut blocks: Vec<Block> = Vec::new();
         for (r, c) in self.carrier.recordings().zip(changed) {
-            let sight = Sight::of(&written(r, c), &self.carrier.rig, band(r));
+            let sight = BandedRecording::of(&written(r, c), &self.carrier.rig, band(r));
             let force = self.force(&sight, r, c);
             let mut columns = sight.nominal.clone();
             columns.push(force.iter().map(|f| -f).collect());

@@ -5,9 +5,9 @@
 
 use std::f64::consts::TAU;
 
+use super::banded_recording::State;
 use super::rig_file::RigFile;
 use super::shapes::{HiddenLaw, Side, Wave};
-use super::sight::State;
 use crate::dynamics::recording::Recording;
 use crate::rng::Rng;
 

@@ -3,10 +3,10 @@
 //! equations is driven with the concealed command and has to move as recorded. The laws that move
 //! it are the generator's own.
 
+use super::banded_recording::State;
 use super::conceal::{Changed, Concealed, conceal};
 use super::rig_file::RigFile;
 use super::shapes::{Along, HiddenLaw, Wave};
-use super::sight::State;
 use crate::dynamics::recording::Recording;
 use crate::generator::drive::{Drive, Segment, Tones};
 use crate::generator::plant::{

@@ -2,10 +2,10 @@
 //! map is written here forward, from its definition, and has to make the recorded command of the
 //! concealed one.
 
+use super::banded_recording::State;
 use super::conceal::{Changed, Concealed, conceal};
 use super::rig_file::RigFile;
 use super::shapes::HiddenLaw;
-use super::sight::State;
 use crate::dynamics::recording::Recording;
 
 const ROW_S: f64 = 2e-3;

@@ -1,6 +1,7 @@
 //! `prove --inject`: known effects concealed in recordings of real machines, the tool and a plain
 //! rival on the same cases.
 
+mod banded_recording;
 mod carrier;
 mod case;
 mod conceal;
@@ -14,7 +15,6 @@ mod plain_laws;
 mod regress;
 mod rig_file;
 mod shapes;
-mod sight;
 mod table;
 mod untouched;
 

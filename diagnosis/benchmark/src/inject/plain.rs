@@ -6,13 +6,13 @@
 
 use std::rc::Rc;
 
+use super::banded_recording::{BandedRecording, band};
 use super::carrier::Carrier;
 use super::plain_laws::{Candidate, candidates};
 use super::regress::{Block, left_on, left_out, solve};
-use super::sight::{Sight, band};
 
 /// Laws that go in at most.
-const MOST: usize = 3;
+const MOST_LAWS: usize = 3;
 /// Size on the held-out recordings over that on the others: within this factor.
 const SAME_SIZE: f64 = 2.0;
 
@@ -35,7 +35,8 @@ struct Tried {
 
 /// Selects laws while the best takes `least` of the force error.
 pub(crate) fn select(carrier: &Carrier, least: f64) -> Vec<Found> {
-    let sights: Vec<Sight> = carrier.recordings().map(|r| Sight::of(r, &carrier.rig, band(r))).collect();
+    let sights: Vec<BandedRecording> =
+        carrier.recordings().map(|r| BandedRecording::of(r, &carrier.rig, band(r))).collect();
     let fits = carrier.fits.len();
     let mut taken: Vec<Rc<Tried>> = Vec::new();
     let mut found: Vec<Found> = Vec::new();
@@ -45,7 +46,7 @@ pub(crate) fn select(carrier: &Carrier, least: f64) -> Vec<Found> {
     if sights.iter().any(|s| s.rows() < 40) {
         return found;
     }
-    while found.len() < MOST {
+    while found.len() < MOST_LAWS {
         let base = blocks(&sights, fits, &taken);
         let coefficients = solve(&base[..fits]);
         let errors = (left_out(&base[..fits]), held_out(&base[fits..], &coefficients, &taken, &sights));
@@ -76,8 +77,8 @@ pub(crate) fn select(carrier: &Carrier, least: f64) -> Vec<Found> {
     found
 }
 
-fn columns(candidate: &Candidate, sights: &[Sight], predicted: &[Vec<f64>]) -> Tried {
-    let of = |(sight, drive): (&Sight, &Vec<f64>)| {
+fn columns(candidate: &Candidate, sights: &[BandedRecording], predicted: &[Vec<f64>]) -> Tried {
+    let of = |(sight, drive): (&BandedRecording, &Vec<f64>)| {
         (candidate.columns)(sight, drive).iter().map(|c| sight.see(c)).collect()
     };
     Tried {
@@ -89,8 +90,8 @@ fn columns(candidate: &Candidate, sights: &[Sight], predicted: &[Vec<f64>]) -> T
 
 /// Nominal columns and those of the laws; a periodic law has two columns for every recording to fit
 /// on.
-fn blocks(sights: &[Sight], fits: usize, laws: &[Rc<Tried>]) -> Vec<Block> {
-    let one = |(r, sight): (usize, &Sight)| {
+fn blocks(sights: &[BandedRecording], fits: usize, laws: &[Rc<Tried>]) -> Vec<Block> {
+    let one = |(r, sight): (usize, &BandedRecording)| {
         let mut columns = sight.nominal.clone();
         for law in laws {
             if !law.periodic {
@@ -109,7 +110,7 @@ fn blocks(sights: &[Sight], fits: usize, laws: &[Rc<Tried>]) -> Vec<Block> {
 
 /// Rms left on the held-out recordings: the phase of a periodic law is found there, its amplitude
 /// is not.
-fn held_out(holdouts: &[Block], coefficients: &[f64], laws: &[Rc<Tried>], sights: &[Sight]) -> f64 {
+fn held_out(holdouts: &[Block], coefficients: &[f64], laws: &[Rc<Tried>], sights: &[BandedRecording]) -> f64 {
     let mut blocks: Vec<Block> = holdouts.to_vec();
     let mut at = sights[0].nominal.len();
     let fits = sights.len() - holdouts.len();
@@ -138,7 +139,7 @@ fn held_out(holdouts: &[Block], coefficients: &[f64], laws: &[Rc<Tried>], sights
 /// The smaller of the two shares of the force error that a law takes; nothing where its sizes do
 /// not agree.
 fn share(
-    sights: &[Sight],
+    sights: &[BandedRecording],
     fits: usize,
     taken: &[Rc<Tried>],
     tried: &Rc<Tried>,
@@ -174,7 +175,7 @@ fn share(
 
 /// The drive's force that the nominal model alone asks for, on every recording's grid: the forces
 /// of the laws so far are small compared with it.
-fn predictions(sights: &[Sight], coefficients: &[f64]) -> Vec<Vec<f64>> {
+fn predictions(sights: &[BandedRecording], coefficients: &[f64]) -> Vec<Vec<f64>> {
     sights
         .iter()
         .map(|sight| {

@@ -4,12 +4,12 @@
 
 use std::f64::consts::TAU;
 
+use super::banded_recording::BandedRecording;
 use super::carrier::Carrier;
-use super::sight::Sight;
 use crate::signal::derivative;
 
 /// Columns on the grid of a recording, from what it shows and the drive's force that is predicted.
-type Columns = Box<dyn Fn(&Sight, &[f64]) -> Vec<Vec<f64>>>;
+type Columns = Box<dyn Fn(&BandedRecording, &[f64]) -> Vec<Vec<f64>>>;
 
 /// One law with one shape.
 pub(crate) struct Candidate {
@@ -24,13 +24,17 @@ struct Builder(Vec<Candidate>);
 
 impl Builder {
     /// A column of the motion: time, place, speed, direction by their index.
-    fn motion(&mut self, name: &'static str, value: impl Fn(&Sight, usize) -> f64 + 'static) {
+    fn motion(&mut self, name: &'static str, value: impl Fn(&BandedRecording, usize) -> f64 + 'static) {
         let columns: Columns = Box::new(move |s, _| vec![(0..s.time.len()).map(|i| value(s, i)).collect()]);
         self.0.push(Candidate { name, columns, periodic: false, by_command: false });
     }
 
     /// A column of the predicted force of the drive.
-    fn command(&mut self, name: &'static str, value: impl Fn(&Sight, &[f64]) -> Vec<f64> + 'static) {
+    fn command(
+        &mut self,
+        name: &'static str,
+        value: impl Fn(&BandedRecording, &[f64]) -> Vec<f64> + 'static,
+    ) {
         let columns: Columns = Box::new(move |s, u| vec![value(s, u)]);
         self.0.push(Candidate { name, columns, periodic: false, by_command: true });
     }
@@ -51,7 +55,7 @@ impl Builder {
 }
 
 /// Every law that the rig and the columns of the recordings allow.
-pub(crate) fn candidates(carrier: &Carrier, sights: &[Sight]) -> Vec<Candidate> {
+pub(crate) fn candidates(carrier: &Carrier, sights: &[BandedRecording]) -> Vec<Candidate> {
     let mut b = Builder(Vec::new());
     friction(&mut b, carrier, sights);
     along(&mut b, carrier, sights);
@@ -60,12 +64,12 @@ pub(crate) fn candidates(carrier: &Carrier, sights: &[Sight]) -> Vec<Candidate> 
     b.0
 }
 
-fn top(sights: &[Sight], of: impl Fn(&Sight) -> &[f64]) -> f64 {
+fn top(sights: &[BandedRecording], of: impl Fn(&BandedRecording) -> &[f64]) -> f64 {
     let all: Vec<f64> = sights.iter().flat_map(|s| of(s).iter().map(|x| x.abs())).collect();
     crate::stats::quantile(&all, 0.98).unwrap_or(1.0)
 }
 
-fn friction(b: &mut Builder, carrier: &Carrier, sights: &[Sight]) {
+fn friction(b: &mut Builder, carrier: &Carrier, sights: &[BandedRecording]) {
     let rig = &carrier.rig;
     let fast = top(sights, |s| &s.speed);
     let seconds = sights.iter().map(|s| s.time[s.time.len() - 1]).fold(f64::INFINITY, f64::min);
@@ -95,7 +99,7 @@ fn friction(b: &mut Builder, carrier: &Carrier, sights: &[Sight]) {
     }
 }
 
-fn along(b: &mut Builder, carrier: &Carrier, sights: &[Sight]) {
+fn along(b: &mut Builder, carrier: &Carrier, sights: &[BandedRecording]) {
     let rig = &carrier.rig;
     b.motion("position_spring", |s, i| s.place[i]);
     if rig.weight.is_none() && sights.iter().all(|s| s.tilt.iter().any(|t| *t != s.tilt[0])) {
@@ -107,13 +111,13 @@ fn along(b: &mut Builder, carrier: &Carrier, sights: &[Sight]) {
     }
 }
 
-fn command(b: &mut Builder, sights: &[Sight]) {
+fn command(b: &mut Builder, sights: &[BandedRecording]) {
     let most = top(sights, |s| &s.drive);
     if most == 0.0 {
         return;
     }
     let seconds = sights.iter().map(|s| s.time[s.time.len() - 1]).fold(f64::INFINITY, f64::min);
-    let band = sights.iter().map(Sight::band).fold(f64::INFINITY, f64::min);
+    let band = sights.iter().map(BandedRecording::band).fold(f64::INFINITY, f64::min);
     for share in [0.05, 0.15, 0.4] {
         let width = share * most;
         b.command("command_deadband", move |_, u| u.iter().map(|u| u.clamp(-width, width)).collect());
@@ -144,15 +148,15 @@ fn command(b: &mut Builder, sights: &[Sight]) {
 const ORDERS: usize = 48;
 const PERIODS: f64 = 1.5;
 
-fn waves(b: &mut Builder, carrier: &Carrier, sights: &[Sight]) {
+fn waves(b: &mut Builder, carrier: &Carrier, sights: &[BandedRecording]) {
     let Some(turn) = carrier.rig.turn else { return };
-    let span = |s: &Sight| {
+    let span = |s: &BandedRecording| {
         let (low, high) = s.place.iter().fold((f64::MAX, f64::MIN), |(l, h), &q| (l.min(q), h.max(q)));
         high - low
     };
     let turns = sights.iter().map(span).fold(f64::INFINITY, f64::min) / turn;
     let fast = top(sights, |s| &s.speed) / turn;
-    let band = sights.iter().map(Sight::band).fold(f64::INFINITY, f64::min);
+    let band = sights.iter().map(BandedRecording::band).fold(f64::INFINITY, f64::min);
     for order in 1..=ORDERS {
         let order = order as f64;
         if order * turns < PERIODS || order > 1.0 && order * fast > 2.0 * band {

@@ -3,8 +3,8 @@
 
 use std::f64::consts::TAU;
 
+use super::banded_recording::State;
 use super::carrier::Carrier;
-use super::sight::State;
 use crate::rng::Rng;
 
 /// A wave along the travel: cycles a turn, share of the amplitude, phase at the recording's zero,

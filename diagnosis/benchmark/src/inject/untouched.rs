@@ -1,6 +1,5 @@
-//! The diagnosis of every carrier as it is: what its model leaves, which is the measure of what is
-//! concealed, and what it names, which is not false later. Kept in a working folder, for it takes
-//! as long as the cases.
+//! Caches the diagnosis of each unmodified machine: it sets the scale of what is concealed and the
+//! names to ignore later.
 
 use std::path::{Path, PathBuf};
 

@@ -74,11 +74,11 @@ fn large(m: &Machine) -> f64 {
 }
 /// True if every drive was on most of the time and was moved.
 pub(super) fn driven(m: &Machine) -> bool {
-    let on = |s: &States| {
+    let is_used = |s: &States| {
         let used = s.force.iter().filter(|f| **f != 0.0).count();
         2 * used > s.force.len() && spread(&s.force) > 0.0
     };
-    !m.asked.is_empty() && m.scales.driven && m.states.iter().all(on)
+    !m.asked.is_empty() && m.scales.driven && m.states.iter().all(is_used)
 }
 fn if_driven(m: &Machine, shapes: Vec<Shape>) -> Vec<Shape> {
     if driven(m) { shapes } else { Vec::new() }
@@ -106,20 +106,20 @@ fn clip(m: &Machine, i: usize, shape: &Shape) -> Vec<Vec<f64>> {
         let part = (u.abs() / limit).min(0.97);
         u * ((1.0 - part.powi(p)).powf(-1.0 / f64::from(p)) - 1.0)
     };
-    let one = |u: &f64| match shape.form {
+    let beyond = |u: &f64| match shape.form {
         "hinge" => hinge(u),
         "6" => inverse(u, 6),
         _ => inverse(u, 12),
     };
-    vec![m.asked[i].iter().map(one).collect()]
+    vec![m.asked[i].iter().map(beyond).collect()]
 }
 
 /// Speeds without load over the fast speed: beyond twice that, the limit hardly falls.
 const NO_LOAD: [(&str, f64); 3] = [("1.1", 1.1), ("1.4", 1.4), ("2", 2.0)];
 
 fn supply_shapes(m: &Machine) -> Vec<Shape> {
-    let at = |(form, _): &(&'static str, f64)| Shape::grid(form, &[0.6, 0.85, 1.2, 1.7]);
-    if_driven(m, NO_LOAD.iter().flat_map(at).collect())
+    let limits = |(form, _): &(&'static str, f64)| Shape::grid(form, &[0.6, 0.85, 1.2, 1.7]);
+    if_driven(m, NO_LOAD.iter().flat_map(limits).collect())
 }
 fn supply(m: &Machine, i: usize, shape: &Shape) -> Vec<Vec<f64>> {
     let (s, u) = (&m.states[i], &m.asked[i]);

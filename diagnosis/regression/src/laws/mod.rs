@@ -14,7 +14,7 @@ mod two_mass;
 mod waves;
 
 pub(crate) use command::{asked_by_motion, large_of};
-pub use record::{Need, RECORDS, Record, Subsystem, Within};
+pub use record::{Bounds, Need, Quantity, RECORDS, Record, Subsystem, Within};
 pub use states::{Scales, States};
 
 use crate::data::Rig;
@@ -26,19 +26,6 @@ pub enum ActsOn {
     Motion,
     /// The force that the motion asks of the drive; never the recorded command.
     Command,
-}
-
-/// The values that a law's coefficient may have.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Size {
-    /// Anything.
-    Any,
-    /// Positive.
-    Positive,
-    /// Between two multiples of the shape's own value: the coefficient has the shape's unit.
-    OfShape(f64, f64),
-    /// Between two multiples of the inertia.
-    OfInertia(f64, f64),
 }
 
 /// One member of a law's family.
@@ -122,8 +109,8 @@ impl Shape {
             n => values[n - 1] / values[n - 2],
         };
         let low = |i: usize| if i > 0 { values[i - 1] } else { values[i] / ratio(i) };
-        let one =
+        let shape =
             |(i, value): (usize, &f64)| Self { form, value: *value, range: Some((low(i), value * ratio(i))) };
-        values.iter().enumerate().map(one).collect()
+        values.iter().enumerate().map(shape).collect()
     }
 }

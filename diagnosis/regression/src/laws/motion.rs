@@ -133,9 +133,9 @@ fn drift_shapes(_: &Machine) -> Vec<Shape> {
 }
 fn drift(m: &Machine, i: usize, shape: &Shape) -> Vec<Vec<f64>> {
     let s = &m.states[i];
-    let at = |k: usize| s.t[k] / m.scales.seconds;
+    let time = |k: usize| s.t[k] / m.scales.seconds;
     let line = shape.form == "line";
-    vec![s.each(|k| s.direction[k] * if line { at(k) - 0.5 } else { (-at(k) / shape.value).exp() })]
+    vec![s.each(|k| s.direction[k] * if line { time(k) - 0.5 } else { (-time(k) / shape.value).exp() })]
 }
 
 fn load_shapes(m: &Machine) -> Vec<Shape> {
@@ -169,7 +169,8 @@ fn spring(m: &Machine, i: usize, shape: &Shape) -> Vec<Vec<f64>> {
     match shape.form {
         "straight" => vec![m.states[i].each(|k| m.states[i].q[k] / m.scales.half_travel)],
         "cubic" => vec![x.clone(), x.iter().map(|x| x.powi(3)).collect()],
-        _ => vec![x.iter().map(|x| (shape.value * x).max(0.0)).collect()],
+        // Pulls back on its side.
+        _ => vec![x.iter().map(|x| shape.value * (shape.value * x).max(0.0)).collect()],
     }
 }
 

@@ -2,7 +2,7 @@
 //! simulator read this one record. The regression's columns, the filter's terms and the plant's
 //! force are each in the file of who computes them.
 
-use super::{ActsOn, Size};
+use super::ActsOn;
 use serde::{Deserialize, Serialize};
 
 /// The subsystem that a law belongs to.
@@ -50,6 +50,53 @@ pub enum Within {
     UnseenGap,
 }
 
+/// A quantity in multiples of which a coefficient is bounded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Quantity {
+    /// None but one: a sign is all that bounds it.
+    One,
+    /// The value of the law's own shape.
+    Shape,
+    /// The steps of the reading as they were found.
+    Jumps,
+    /// The inertia of the motor without its load.
+    MotorInertia,
+    /// The smallest gain of the drive that the rig allows.
+    SmallestGain,
+    /// The largest gain of the drive that the rig allows.
+    LargestGain,
+    /// The largest gain that the rig allows; half of the gain where the rig hardly knows it.
+    TrustedGain,
+    /// Twice the rig's viscous friction.
+    TwiceViscous,
+    /// Twice the rig's dry friction.
+    TwiceDry,
+    /// The largest dry friction within the rig's uncertainty.
+    LargestDry,
+}
+
+/// Bounds of a coefficient, in multiples of a quantity.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bounds {
+    /// The lower bound.
+    pub low: f64,
+    /// The upper bound.
+    pub high: f64,
+    /// The quantity.
+    pub of: Quantity,
+}
+
+impl Bounds {
+    /// Any coefficient.
+    pub const FREE: Self = Self { low: f64::NEG_INFINITY, ..Self::POSITIVE };
+    /// Any coefficient that is not below zero.
+    pub const POSITIVE: Self = bounds(0.0, f64::INFINITY, Quantity::One);
+}
+
+const fn bounds(low: f64, high: f64, of: Quantity) -> Bounds {
+    Bounds { low, high, of }
+}
+
 /// A law of the library.
 #[derive(Debug, Clone, Copy)]
 pub struct Record {
@@ -66,8 +113,9 @@ pub struct Record {
     /// True if it is a sine of the place: without an absolute reading every recording has a phase
     /// of its own.
     pub wave: bool,
-    /// The values that its first coefficient may have.
-    pub size: Size,
+    /// The values that the coefficient of each of its terms may have; the last holds for all terms
+    /// beyond it.
+    pub bounds: &'static [Bounds],
     /// The plain law that it refines: that one goes first where the rig has none.
     pub refines: Option<&'static str>,
     /// The facts that recordings must show.
@@ -86,7 +134,7 @@ const fn law(key: &'static str, equation: &'static str, words: &'static str) -> 
         subsystem: Subsystem::Transmission,
         acts_on: ActsOn::Motion,
         wave: false,
-        size: Size::Any,
+        bounds: FREE,
         refines: None,
         needs: &[],
         twins: &[],
@@ -97,24 +145,55 @@ const fn law(key: &'static str, equation: &'static str, words: &'static str) -> 
 const fn drive(key: &'static str, equation: &'static str, words: &'static str) -> Record {
     let needs = &[Need::ChangingCommand];
     let (subsystem, acts_on) = (Subsystem::Actuator, ActsOn::Command);
-    Record { subsystem, acts_on, size: Size::Positive, needs, ..law(key, equation, words) }
+    Record { subsystem, acts_on, bounds: POSITIVE, needs, ..law(key, equation, words) }
 }
 
-/// The load is a part of the nominal inertia, which may be declared half too small.
-const LOAD: Size = Size::OfInertia(0.0, 1.5);
+/// A force of either direction: nothing in its physics bounds it.
+const FREE: &[Bounds] = &[Bounds::FREE];
+/// Friction takes energy and never gives any, and a drive loses by a deadband, a clip or a lag.
+const POSITIVE: &[Bounds] = &[Bounds::POSITIVE];
+/// Friction brakes in both directions, so that they differ from their mean by less than that.
+const ASYMMETRY: &[Bounds] =
+    &[bounds(-1.0, 1.0, Quantity::TwiceViscous), bounds(-1.0, 1.0, Quantity::TwiceDry)];
+/// Friction that warms up stays friction; assumed: a tenth of it stays, and it grows fourfold at
+/// most. Dry friction first, then viscous.
+const WARMING: &[Bounds] =
+    &[bounds(-0.9, 3.0, Quantity::LargestDry), bounds(-0.9, 3.0, Quantity::TwiceViscous)];
+/// A spring pulls back; its force where the recording starts has either sign.
+const SPRING: &[Bounds] = &[Bounds::POSITIVE, Bounds::FREE];
+/// Counts that are lost are lost once; assumed: a size found in noise and quantisation, and an
+/// inertia that the rig has wrong, are off by this much.
+const LOST: &[Bounds] = &[bounds(0.5, 1.6, Quantity::Jumps)];
+/// A load is a mass, which is not below zero; assumed: at most six times its motor's.
+const ON_SPRING: &[Bounds] = &[bounds(0.0, 6.0, Quantity::MotorInertia)];
+/// Assumed: less than a tenth of its motor's is not felt through a gap; eight times at most.
+const BEHIND_GAP: &[Bounds] = &[bounds(0.1, 8.0, Quantity::MotorInertia)];
+/// A small mass that always slips is a friction of another form, not a drive that lets go; assumed:
+/// small is 0.3 of its motor's, and eight times is the most.
+const IN_GRIP: &[Bounds] = &[bounds(0.3, 8.0, Quantity::MotorInertia)];
+/// A commutation may lose most of the torque at some angle, and the part is one of the gain as it
+/// is; where that is hardly known, a ripple as large explains what cogging does.
+const RIPPLE: &[Bounds] = &[bounds(-0.9, 0.9, Quantity::TrustedGain)];
+/// Assumed: least squares on a delayed force find its delay to this part.
+const DELAY: &[Bounds] = &[bounds(0.6, 1.6, Quantity::Shape)];
+/// The gain keeps its sign, whatever gain the rig allows: the smallest bounds its drift.
+const GAIN: &[Bounds] = &[bounds(-1.0, 1.0, Quantity::SmallestGain)];
+/// A drive that loses all does not move its axis; assumed: nor does one that loses nine tenths.
+const LOSS: &[Bounds] = &[bounds(0.0, 0.9, Quantity::LargestGain)];
 const DRY: Option<&str> = Some("coulomb_friction");
 const VISCOUS: Option<&str> = Some("viscous_friction");
 
 /// The laws, those of the motion first.
 pub static RECORDS: [Record; 27] = [
-    Record { size: Size::Positive, ..law("viscous_friction", "b·q̇", "friction that grows with speed") },
+    Record { bounds: POSITIVE, ..law("viscous_friction", "b·q̇", "friction that grows with speed") },
     Record {
-        size: Size::Positive,
+        bounds: POSITIVE,
         twins: &[(Within::OneWay, "asymmetric_friction")],
         ..law("coulomb_friction", "F·sgn q̇", "dry friction")
     },
     Record {
         refines: DRY,
+        bounds: ASYMMETRY,
         ..law(
             "asymmetric_friction",
             "F·|sgn q̇| + b·|q̇|, or one of them",
@@ -123,20 +202,20 @@ pub static RECORDS: [Record; 27] = [
     },
     Record {
         refines: VISCOUS,
-        size: Size::Positive,
+        bounds: POSITIVE,
         twins: &[(Within::OneSpeed, "stribeck_friction")],
         ..law("quadratic_drag", "c·q̇·|q̇|", "drag with the square of speed")
     },
     Record {
         refines: DRY,
-        size: Size::Positive,
+        bounds: POSITIVE,
         needs: &[Need::DryFriction],
         twins: &[(Within::OneSpeed, "quadratic_drag")],
         ..law("stribeck_friction", "P·sgn q̇·exp(−(|q̇|/v)^δ)", "friction that falls as speed rises from zero")
     },
     Record {
         refines: DRY,
-        size: Size::Positive,
+        bounds: POSITIVE,
         needs: &[Need::DryFriction],
         twins: &[(Within::OneLength, "backlash")],
         ..law(
@@ -149,6 +228,7 @@ pub static RECORDS: [Record; 27] = [
         refines: DRY,
         needs: &[Need::DryFriction],
         twins: &[(Within::OneSpeed, "gain_drift")],
+        bounds: WARMING,
         ..law(
             "friction_drift",
             "F·sgn q̇·exp(−t/τ), or in proportion to t",
@@ -156,12 +236,13 @@ pub static RECORDS: [Record; 27] = [
         )
     },
     Record {
-        size: Size::Positive,
+        bounds: POSITIVE,
         ..law("load_dependent_friction", "µ·|load|·sgn q̇", "dry friction that grows with the load")
     },
     Record {
         subsystem: Subsystem::Load,
         twins: &[(Within::LessThanATurn, "mass_imbalance")],
+        bounds: SPRING,
         ..law("position_spring", "c·x + d·x³, or on one side of a place", "a spring along the travel")
     },
     Record {
@@ -180,11 +261,11 @@ pub static RECORDS: [Record; 27] = [
     },
     Record {
         subsystem: Subsystem::Sensor,
-        size: Size::OfInertia(0.5, 1.6),
+        bounds: LOST,
         ..law("missed_counts", "J·(second difference of the counts lost)", "lost encoder counts")
     },
     Record {
-        size: LOAD,
+        bounds: ON_SPRING,
         needs: &[Need::Inertia],
         twins: &[(Within::LeavesMuch, "backlash")],
         ..law(
@@ -194,13 +275,13 @@ pub static RECORDS: [Record; 27] = [
         )
     },
     Record {
-        size: LOAD,
+        bounds: BEHIND_GAP,
         needs: &[Need::DryFriction, Need::Inertia],
         twins: &[(Within::UnseenGap, "drive_compliance"), (Within::OneLength, "presliding_friction")],
         ..law("backlash", "J_load·(a_load − q̈), a gap between them", "a gap at reversals")
     },
     Record {
-        size: LOAD,
+        bounds: IN_GRIP,
         needs: &[Need::Inertia],
         twins: &[(Within::Line, "command_saturation")],
         ..law(
@@ -229,6 +310,7 @@ pub static RECORDS: [Record; 27] = [
         subsystem: Subsystem::Actuator,
         wave: true,
         acts_on: ActsOn::Command,
+        bounds: RIPPLE,
         ..law(
             "torque_ripple",
             "û·(A·sin(n·θ) + B·cos(n·θ))",
@@ -253,12 +335,12 @@ pub static RECORDS: [Record; 27] = [
         )
     },
     Record {
-        size: Size::OfShape(0.6, 1.6),
+        bounds: DELAY,
         ..drive("command_delay", "û(t + τ) − û(t)", "a delay between command and torque")
     },
     drive("electrical_lag", "τ·dû/dt", "a first-order lag between command and torque"),
     Record {
-        size: Size::Any,
+        bounds: GAIN,
         needs: &[Need::ChangingCommand, Need::Inertia],
         twins: &[(Within::OneSpeed, "friction_drift")],
         ..drive("gain_drift", "û·g(t), or of the heat ∫û²", "a torque constant that drifts")
@@ -266,9 +348,17 @@ pub static RECORDS: [Record; 27] = [
     Record {
         subsystem: Subsystem::Transmission,
         refines: DRY,
+        bounds: LOSS,
         ..drive("drive_loss", "f·|û|·sgn q̇", "a loss in proportion to the drive's own force, as a gear has")
     },
 ];
+
+impl Record {
+    /// Returns the bounds of a term's coefficient.
+    pub fn bounds_of(&self, term: usize) -> Bounds {
+        self.bounds[term.min(self.bounds.len() - 1)]
+    }
+}
 
 /// Returns the record of a key; a law without one does not compile.
 pub(super) const fn of(key: &str) -> &'static Record {

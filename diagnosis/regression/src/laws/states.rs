@@ -155,7 +155,7 @@ impl Scales {
     /// Scales of the fit recordings alone; rates are of all.
     pub(crate) fn new(signals: &[Signals], states: &[States], parts: &[Part], tiling: &Tiling) -> Self {
         let fit: Vec<usize> = (0..parts.len()).filter(|i| parts[*i] == Part::Fit).collect();
-        let all = |f: fn(&States) -> &Vec<f64>, p: f64| {
+        let quantile_of = |f: fn(&States) -> &Vec<f64>, p: f64| {
             quantile(fit.iter().flat_map(|i| f(&states[*i]).iter().map(|x| x.abs())), p) + 1e-30
         };
         let bound = |p: f64| fit.iter().map(move |i| quantile(states[*i].q.iter().copied(), p));
@@ -168,9 +168,9 @@ impl Scales {
             lowest_hz: tiling.rows.iter().map(|r| r.hz).fold(f64::INFINITY, f64::min),
             rate_hz: states.iter().map(|s| 1.0 / s.h).fold(f64::INFINITY, f64::min),
             fast: most(&|i| signals[i].fast),
-            hard: all(|s| &s.a, 0.98),
-            stroke: all(|s| &s.since, 0.98),
-            short_stroke: all(|s| &s.since, 0.9),
+            hard: quantile_of(|s| &s.a, 0.98),
+            stroke: quantile_of(|s| &s.since, 0.98),
+            short_stroke: quantile_of(|s| &s.since, 0.9),
             middle: 0.5 * (low + high),
             half_travel: (0.5 * (high - low)).max(1e-12),
             least_travel: travels.clone().fold(f64::INFINITY, f64::min),

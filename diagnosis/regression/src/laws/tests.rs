@@ -8,18 +8,18 @@ const H: f64 = 1e-3;
 /// States of a motion that is known at every time; nothing is masked.
 fn machine(q: impl Fn(f64) -> f64, asked: impl Fn(f64) -> f64) -> Machine {
     let t: Vec<f64> = (0..4000).map(|i| f64::from(i) * H).collect();
-    let of = |f: &dyn Fn(f64) -> f64| t.iter().map(|t| f(*t)).collect::<Vec<f64>>();
-    let v = of(&|t| (q(t + 1e-5) - q(t - 1e-5)) / 2e-5);
-    let a = of(&|t| (q(t + 1e-4) - 2.0 * q(t) + q(t - 1e-4)) / 1e-8);
+    let over_time = |f: &dyn Fn(f64) -> f64| t.iter().map(|t| f(*t)).collect::<Vec<f64>>();
+    let v = over_time(&|t| (q(t + 1e-5) - q(t - 1e-5)) / 2e-5);
+    let a = over_time(&|t| (q(t + 1e-4) - 2.0 * q(t) + q(t - 1e-4)) / 1e-8);
     let one = vec![1.0; t.len()];
     let states = States {
         h: H,
-        q: of(&q),
+        q: over_time(&q),
         seen_a: a.clone(),
         direction: v.iter().map(|v| v.signum()).collect(),
         moving: one.clone(),
         since: one.clone(),
-        force: of(&asked),
+        force: over_time(&asked),
         tilt: None,
         load: None,
         jumps: vec![0.0; t.len()],
@@ -62,7 +62,7 @@ fn machine(q: impl Fn(f64) -> f64, asked: impl Fn(f64) -> f64) -> Machine {
         driven: true,
         large_asked: 1.0,
     };
-    Machine { rig, states: vec![states], scales, asked: vec![of(&asked)] }
+    Machine { rig, states: vec![states], scales, asked: vec![over_time(&asked)] }
 }
 
 fn column(m: &Machine, name: &str, form: &'static str, value: f64) -> Vec<Vec<f64>> {
@@ -85,6 +85,17 @@ fn a_bristle_bends_exponentially_after_a_reversal() {
         let travelled = k as f64 * H - 2.0;
         let expected = -1.0 + 2.0 * (-travelled / 0.1).exp();
         assert!((z - expected).abs() < 1e-6, "{z} {expected}");
+    }
+}
+
+#[test]
+fn a_spring_of_positive_size_pulls_back_on_either_side() {
+    let m = machine(|t| 8.0 * (2.0 * t).sin(), |_| 0.0);
+    for side in [1.0, -1.0] {
+        let force = &column(&m, "position_spring", "one side", side)[0];
+        for (force, q) in force.iter().zip(&m.states[0].q) {
+            assert!(force * q >= 0.0 && (*force != 0.0) == (q * side > 0.0), "{side}: {force} at {q}");
+        }
     }
 }
 

@@ -24,8 +24,8 @@ fn follow(s: &States, fastest: f64, brake: f64, push: impl Fn(f64, f64, f64) -> 
         let mut sum = 0.0;
         for part in 0..steps {
             let f = (part as f64 + 0.5) / steps as f64;
-            let at = |y: &[f64]| y[k] + (y[next] - y[k]) * f;
-            let a = push(at(&s.q) - x, at(&s.v) - u, h);
+            let between = |y: &[f64]| y[k] + (y[next] - y[k]) * f;
+            let a = push(between(&s.q) - x, between(&s.v) - u, h);
             u += a * h;
             u -= u.clamp(-brake * h, brake * h);
             x += u * h;

@@ -10,15 +10,18 @@ use numerics::bootstrap::Random;
 #[test]
 fn two_parts_of_one_jump_agree_in_sign() {
     let (now, next) = ([1.0, -0.6, 0.1, 0.0, 0.0], [0.0, 1.0, -0.6, 0.1, 0.0]);
-    let left = |a: f64, b: f64| -> Vec<f64> { now.iter().zip(next).map(|(x, y)| a * x + b * y).collect() };
+    let residual =
+        |a: f64, b: f64| -> Vec<f64> { now.iter().zip(next).map(|(x, y)| a * x + b * y).collect() };
     let pair = |left: &[f64]| Pair::new(&now, &next, left);
-    let half = pair(&left(2.0, 2.0));
-    let all: f64 = left(2.0, 2.0).iter().map(|x| x * x).sum();
+    let half = pair(&residual(2.0, 2.0));
+    let all: f64 = residual(2.0, 2.0).iter().map(|x| x * x).sum();
     assert!((half.size() - 4.0).abs() < 1e-9 && (half.gain - 0.5 * all).abs() < 1e-9);
-    assert!((pair(&left(1.0, 3.0)).later() - 0.75).abs() < 1e-9);
-    let opposed = pair(&left(3.0, -1.0));
-    assert!(opposed.second == 0.0 && opposed.gain < 0.5 * left(3.0, -1.0).iter().map(|x| x * x).sum::<f64>());
-    assert!(pair(&left(0.0, 5.0)).second > 4.9);
+    assert!((pair(&residual(1.0, 3.0)).later() - 0.75).abs() < 1e-9);
+    let opposed = pair(&residual(3.0, -1.0));
+    assert!(
+        opposed.second == 0.0 && opposed.gain < 0.5 * residual(3.0, -1.0).iter().map(|x| x * x).sum::<f64>()
+    );
+    assert!(pair(&residual(0.0, 5.0)).second > 4.9);
 }
 
 const ROWS_PER_S: f64 = 5000.0;
@@ -42,7 +45,7 @@ fn turning(mut counts: impl FnMut(f64) -> f64) -> ([BlockedRecording; 1], Nomina
 
 /// Returns the counts found to be lost, and the blocks' starts, s, of an axis whose reading
 /// moves by `counts`.
-fn lost(counts: impl Fn(f64) -> f64, asked: Asked) -> (Vec<f64>, Vec<f64>) {
+fn lost(counts: impl Fn(f64) -> f64, asked: JumpPrior) -> (Vec<f64>, Vec<f64>) {
     let (tracks, nominal, count) = turning(counts);
     let noise = Noise { sensor: 1.0, white: 1e-3, slow: 1e-9, tau: 0.1, rest: 1.0, blur: 0.0 };
     let fit = Fit::new(&Model::default(), &nominal, &tracks, &noise);
@@ -54,26 +57,31 @@ fn lost(counts: impl Fn(f64) -> f64, asked: Asked) -> (Vec<f64>, Vec<f64>) {
 fn lost_counts_are_found_with_their_moment_and_number() {
     let after = |at: f64, t: f64| f64::from(u8::from(t >= at));
     let reads = |t: f64| 3000.3 * t - 2.0 * after(0.6003, t) - after(1.2349, t);
-    let (lost, start) = lost(reads, Asked::UNKNOWN);
-    let at = |t: f64| lost[start.partition_point(|start| *start < t)];
-    assert_eq!(at(0.58), 0.0);
-    assert!((at(0.62) + 2.0).abs() < 0.1 && (at(1.26) + 3.0).abs() < 0.1, "{} {}", at(0.62), at(1.26));
+    let (lost, start) = lost(reads, JumpPrior::UNKNOWN);
+    let lost_at = |t: f64| lost[start.partition_point(|start| *start < t)];
+    assert_eq!(lost_at(0.58), 0.0);
+    assert!(
+        (lost_at(0.62) + 2.0).abs() < 0.1 && (lost_at(1.26) + 3.0).abs() < 0.1,
+        "{} {}",
+        lost_at(0.62),
+        lost_at(1.26)
+    );
 }
 
 #[test]
 fn a_single_loss_needs_other_losses_unlike_an_impact() {
     let once = |t: f64| 3000.3 * t - if t < 0.6 { 0.0 } else { 3.0 };
     let any = |lost: (Vec<f64>, Vec<f64>)| lost.0.iter().any(|lost| *lost != 0.0);
-    assert!(!any(lost(once, Asked::UNKNOWN)) && any(lost(once, Asked::KNOWN)));
+    assert!(!any(lost(once, JumpPrior::UNKNOWN)) && any(lost(once, JumpPrior::KNOWN)));
     let impact = |t: f64| 3000.3 * t - 60.0 * (t - 0.6).max(0.0);
-    assert!(!any(lost(impact, Asked::KNOWN)));
+    assert!(!any(lost(impact, JumpPrior::KNOWN)));
 }
 
 /// The price is what keeps a search of the very recording that is judged from gaining by
 /// chance.
 #[test]
 fn jumps_that_chance_makes_cost_more_than_they_gain() {
-    let any = Asked { gain: 2.0, least: 0.0, fewest: 1 };
+    let any = JumpPrior { gain: 2.0, least: 0.0, fewest: 1 };
     let (mut gained, mut paid, mut jumps) = (0.0, 0.0, 0);
     for seed in 1..21 {
         let mut random = Random::new(seed);
@@ -108,12 +116,12 @@ fn jumps_just_after_the_command_has_changed_are_no_lost_counts() {
     track.motion.rest.fill(false);
     let noise = Noise { sensor: 1.0, white: 1e-3, slow: 1e-9, tau: 0.1, rest: 1.0, blur: 0.0 };
     let gains = Gains::new(&track.observed(), &noise);
-    let at = |time: f64| {
+    let jump_at = |time: f64| {
         let block = track.blocks.start.partition_point(|start| *start < time);
         Jump::new(&track, &gains, block, 0.0)
     };
-    let switched: Vec<Jump> = (1..12).map(|i| at(0.1 * f64::from(i) + 0.006)).collect();
+    let switched: Vec<Jump> = (1..12).map(|i| jump_at(0.1 * f64::from(i) + 0.006)).collect();
     assert!(follows_command(&track, &switched));
-    let anywhere: Vec<Jump> = (1..12).map(|i| at(0.137 * f64::from(i) + 0.02)).collect();
+    let anywhere: Vec<Jump> = (1..12).map(|i| jump_at(0.137 * f64::from(i) + 0.02)).collect();
     assert!(!follows_command(&track, &anywhere));
 }

@@ -20,13 +20,13 @@ fn stopped_for_a_moment() -> BlockedRecording {
 fn an_axis_rests_where_expected_counts_do_not_come() {
     let track = stopped_for_a_moment();
     let count = track.blocks.z[1] - track.blocks.z[0];
-    let at = |counts_per_block: f64| {
+    let still_at = |counts_per_block: f64| {
         let v: Vec<f64> = track.blocks.span.iter().map(|h| counts_per_block * count / h).collect();
         still(&track, &v, count)
     };
     let resting = |at: &[bool]| (0..at.len()).filter(|j| at[*j]).collect::<Vec<_>>();
-    assert_eq!(resting(&at(0.6)), [40, 41, 42, 43, 44, 45], "3.6 counts promised");
-    assert!(resting(&at(0.2)).is_empty(), "1.2 counts are one more block's");
+    assert_eq!(resting(&still_at(0.6)), [40, 41, 42, 43, 44, 45], "3.6 counts promised");
+    assert!(resting(&still_at(0.2)).is_empty(), "1.2 counts are one more block's");
 }
 
 #[test]

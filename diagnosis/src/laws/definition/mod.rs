@@ -7,9 +7,7 @@ mod search;
 
 pub(crate) use law::{Coupling, EffectLaw, ForceLaw, NominalTerm};
 pub(crate) use report::{EffectReport, Fitted, Reported, sized};
-pub(crate) use search::{
-    Allowed, Believed, EffectSearch, FREE, Factors, Movable, POSITIVE, Plain, Shown, Span, Unnamed,
-};
+pub(crate) use search::{EffectSearch, ExcitationLimits, Factors, Movable, Plain, RigFacts, Span, Unnamed};
 
 /// An effect.
 pub(crate) trait Definition: EffectLaw + EffectSearch + EffectReport {}

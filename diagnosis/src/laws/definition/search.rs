@@ -40,12 +40,12 @@ pub(crate) struct Span {
     pub(crate) tilt: bool,
     pub(crate) force: bool,
     /// The rig's statement of the machine.
-    pub(crate) rig: Believed,
+    pub(crate) rig: RigFacts,
 }
 
 /// The rig's statement of the machine.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Believed {
+pub(crate) struct RigFacts {
     /// Travel per turn of the motor and of the axis itself, where they are known, rad or m.
     pub(crate) turn: Option<f64>,
     pub(crate) axis_turn: Option<f64>,
@@ -65,7 +65,7 @@ pub(crate) struct Believed {
     pub(crate) per_command: f64,
 }
 
-impl Shown {
+impl ExcitationLimits {
     /// True if the recordings, and a fitted effect, are within a limit.
     pub(crate) fn is_within(&self, limit: Within, effect: &Effect) -> bool {
         match limit {
@@ -87,29 +87,9 @@ impl Span {
     }
 }
 
-/// Sizes that the rig allows an effect, per inertia.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Allowed {
-    /// Gain over inertia as far as it is known, the factor by which the truth may differ, and
-    /// whether a measured force gave it.
-    pub(crate) gain: f64,
-    pub(crate) gain_reach: f64,
-    pub(crate) is_anchored: bool,
-    /// Most that viscous and dry friction of the rig may be; none where it has none.
-    pub(crate) viscous: Option<f64>,
-    pub(crate) dry: Option<f64>,
-    /// Most that the truth of dry friction may be by the rig's uncertainty.
-    pub(crate) dry_by_uncertainty: f64,
-}
-
-/// Anything.
-pub(crate) const FREE: (f64, f64) = (f64::NEG_INFINITY, f64::INFINITY);
-/// Anything not below zero.
-pub(crate) const POSITIVE: (f64, f64) = (0.0, f64::INFINITY);
-
 /// Limits of the recordings that decide whether twins can be distinguished.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Shown {
+pub(crate) struct ExcitationLimits {
     /// True if all motion is at one speed, one way, in strokes of one length, within less than a
     /// turn, and along a line.
     pub(crate) one_speed: bool,
@@ -212,12 +192,6 @@ pub(crate) trait EffectSearch {
     /// True if values of a shape go together.
     fn is_possible(&self, _effect: &Effect) -> bool {
         true
-    }
-
-    /// Returns the bounds of a term's coefficient, per inertia, within which the effect is what its
-    /// name says.
-    fn limits(&self, _term: usize, _allowed: &Allowed) -> (f64, f64) {
-        FREE
     }
 
     /// True if it is in doubt where the coefficient of a term is at its limit.

@@ -2,9 +2,10 @@
 
 use super::Formula;
 use crate::laws::definition::{
-    Allowed, EffectLaw, EffectReport, EffectSearch, FREE, Fitted, ForceLaw, Movable, POSITIVE, Reported, Span,
+    EffectLaw, EffectReport, EffectSearch, Fitted, ForceLaw, Movable, Reported, Span,
 };
 use crate::laws::{Effect, EffectName, State};
+use regression::laws::Bounds;
 
 /// A formula along a recording or in a plant, with the values of its shape.
 #[derive(Debug, Clone)]
@@ -55,14 +56,14 @@ impl EffectSearch for Formula {
                 let part = (i as f64 + 0.5) / count as f64;
                 if *low > 0.0 { low * (high / low).powf(part) } else { low + (high - low) * part }
             };
-            let with = |effect: &Effect, i: usize| {
+            let with_value = |effect: &Effect, i: usize| {
                 let mut effect = effect.clone();
                 effect.shape.insert((*key).to_owned(), value(i));
                 effect
             };
             out = out
                 .iter()
-                .flat_map(|effect| (0..count).map(|i| with(effect, i)).collect::<Vec<_>>())
+                .flat_map(|effect| (0..count).map(|i| with_value(effect, i)).collect::<Vec<_>>())
                 .collect();
         }
         out
@@ -71,17 +72,21 @@ impl EffectSearch for Formula {
         // Refinement moves logarithms.
         self.shape.iter().filter(|(_, low, _)| *low > 0.0).copied().collect()
     }
-    fn limits(&self, term: usize, _allowed: &Allowed) -> (f64, f64) {
-        // Per inertia, which is not known exactly: the sign is what bounds say for sure.
-        match self.linear.get(term).and_then(|name| self.text.parameters.get(name)) {
-            Some([low, _]) if *low >= 0.0 => POSITIVE,
-            Some([_, high]) if *high <= 0.0 => (f64::NEG_INFINITY, 0.0),
-            Some(_) => FREE,
-            None => POSITIVE,
-        }
-    }
     fn freedom(&self, _effect: &Effect, _recordings: usize) -> usize {
         self.terms().len()
+    }
+}
+
+impl Formula {
+    /// Returns the bounds of a term's coefficient: its sign, since it is fitted per inertia, which
+    /// is not known exactly.
+    pub(crate) fn bounds_of(&self, term: usize) -> Bounds {
+        match self.linear.get(term).and_then(|name| self.text.parameters.get(name)) {
+            Some([low, _]) if *low >= 0.0 => Bounds::POSITIVE,
+            Some([_, high]) if *high <= 0.0 => Bounds { high: 0.0, ..Bounds::FREE },
+            Some(_) => Bounds::FREE,
+            None => Bounds::POSITIVE,
+        }
     }
 }
 

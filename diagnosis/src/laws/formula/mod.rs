@@ -61,6 +61,9 @@ enum Source {
     Shape(usize),
 }
 
+/// Values of the variables, and of all parameters.
+type Sample = ([f64; 5], Vec<f64>);
+
 /// The term of a formula that is linear in none of its parameters.
 const SCALE: &str = "scale";
 
@@ -176,7 +179,7 @@ impl Formula {
 
     /// Sets where the expression's variables come from.
     fn place(&mut self) {
-        let of = |name: &String| {
+        let source = |name: &String| {
             VARIABLES
                 .iter()
                 .position(|v| v == name)
@@ -185,7 +188,7 @@ impl Formula {
                 .or_else(|| self.shape.iter().position(|s| s.0 == name).map(Source::Shape))
                 .unwrap_or(Source::Variable(0))
         };
-        self.sources = self.expression.var_names().iter().map(of).collect();
+        self.sources = self.expression.var_names().iter().map(source).collect();
     }
 
     fn evaluate(&self, variables: &[f64; 5], linear: &[f64], shape: &[f64], scratch: &mut Vec<f64>) -> f64 {
@@ -199,7 +202,7 @@ impl Formula {
     }
 
     /// States and shape values over several decades and within the bounds.
-    fn samples(&self) -> Vec<([f64; 5], Vec<f64>)> {
+    fn samples(&self) -> Vec<Sample> {
         let mut from = trials(4000);
         let mut next = || from.next().unwrap_or(0.5);
         let mut out = Vec::new();
@@ -241,25 +244,17 @@ impl Formula {
         let samples = self.samples();
         let mut scratch = Vec::new();
         let mut chosen: Vec<usize> = Vec::new();
-        let at =
-            |formula: &Self, scratch: &mut Vec<f64>, sample: &([f64; 5], Vec<f64>), set: &[(usize, f64)]| {
-                let mut shape = sample.1.clone();
-                for (i, x) in set {
-                    shape[*i] = *x;
-                }
-                formula.evaluate(&sample.0, &[], &shape, scratch)
-            };
         for candidate in 0..self.shape.len() {
             let together: Vec<usize> = chosen.iter().copied().chain([candidate]).collect();
             // Twice and three times all of them together must be twice and three times the force
             // above that without them.
             let is_linear = samples.iter().all(|sample| {
-                let mut with = |factor: f64| {
+                let mut force_times = |factor: f64| {
                     let set: Vec<(usize, f64)> =
                         together.iter().map(|i| (*i, factor * (1.0 + *i as f64))).collect();
-                    at(self, &mut scratch, sample, &set)
+                    self.force_at(sample, &set, &mut scratch)
                 };
-                let [none, one, two, three] = [0.0, 1.0, 2.0, 3.0].map(&mut with);
+                let [none, one, two, three] = [0.0, 1.0, 2.0, 3.0].map(&mut force_times);
                 let close = |a: f64, b: f64| (a - b).abs() <= 1e-9 * (one.abs() + none.abs() + 1e-12);
                 close(two - none, 2.0 * (one - none)) && close(three - none, 3.0 * (one - none))
             });
@@ -269,7 +264,7 @@ impl Formula {
         }
         let homogeneous = samples.iter().all(|sample| {
             let set: Vec<(usize, f64)> = chosen.iter().map(|i| (*i, 0.0)).collect();
-            at(self, &mut scratch, sample, &set).abs() < 1e-12
+            self.force_at(sample, &set, &mut scratch).abs() < 1e-12
         });
         if chosen.is_empty() || !homogeneous {
             self.linear = Vec::new();
@@ -281,13 +276,20 @@ impl Formula {
         self.place();
     }
 
+    /// The force at a sample's variables and parameters, some of which are `set` to other values.
+    fn force_at(&self, sample: &Sample, set: &[(usize, f64)], scratch: &mut Vec<f64>) -> f64 {
+        let mut shape = sample.1.clone();
+        set.iter().for_each(|(i, x)| shape[*i] = *x);
+        self.evaluate(&sample.0, &[], &shape, scratch)
+    }
+
     /// True if the force jumps to its opposite where the speed turns, as dry friction does.
     fn turns_with_speed(&self) -> bool {
         let linear = vec![1.0; self.linear.len()];
         let mut scratch = Vec::new();
         let shape: Vec<f64> = self.shape.iter().map(|s| 0.5 * (s.1 + s.2)).collect();
-        let mut at = |v: f64| self.evaluate(&[v, 0.1, 0.1, 0.1, 0.1], &linear, &shape, &mut scratch);
-        let (forward, backward) = (at(1e-12), at(-1e-12));
+        let mut force = |v: f64| self.evaluate(&[v, 0.1, 0.1, 0.1, 0.1], &linear, &shape, &mut scratch);
+        let (forward, backward) = (force(1e-12), force(-1e-12));
         forward * backward < 0.0 && (forward + backward).abs() < 1e-3 * forward.abs()
     }
 
@@ -315,7 +317,7 @@ impl Formula {
     pub(crate) fn values(&self, s: &State, velocity: f64, shape: &[f64], out: &mut [f64]) {
         let mut scratch = Vec::with_capacity(self.sources.len());
         let mut linear = vec![0.0; self.linear.len()];
-        let mut at = |velocity: f64, linear: &[f64]| {
+        let mut force = |velocity: f64, linear: &[f64]| {
             self.evaluate(&[velocity, s.position, s.command, s.time, s.tilt], linear, shape, &mut scratch)
         };
         for (k, term) in out.iter_mut().enumerate() {
@@ -324,9 +326,9 @@ impl Formula {
             }
             let value = if velocity == 0.0 {
                 // The sign of nothing is nothing: what jumps there is half of either side.
-                0.5 * (at(HARDLY, &linear) + at(-HARDLY, &linear))
+                0.5 * (force(HARDLY, &linear) + force(-HARDLY, &linear))
             } else {
-                at(velocity, &linear)
+                force(velocity, &linear)
             };
             *term = if value.is_finite() { value } else { 0.0 };
             if let Some(own) = linear.get_mut(k) {

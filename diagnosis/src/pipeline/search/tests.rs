@@ -51,9 +51,12 @@ fn decided(machine: &Rig) -> Vec<(N, usize)> {
     let on = search.context(&now.tracks);
     let cogging = Effect::of_orders(N::Cogging, TAU, &[6.0]);
     let ripple = Effect::of_orders(N::TorqueRipple, TAU, &[10.0]);
-    let candidate =
-        on.fit(Model { effects: vec![cogging, ripple], ..Model::default() }, &now.white.noise, Colour::White);
-    let chosen = with_enough_laws(&on, candidate);
+    let candidate = on.fit(
+        Model { effects: vec![cogging, ripple], ..Model::default() },
+        &now.white_fit.noise,
+        Colour::White,
+    );
+    let chosen = prefer_fewer_waves(&on, candidate);
     chosen.model.effects.iter().map(|one| (one.name, one.waves().len())).collect()
 }
 
@@ -85,7 +88,7 @@ fn held_out_recordings_choose_nothing() {
         let checked = Checked::unchanged(&fit, holdout);
         let prepared = prepare(&rig(""), &checked, Some(0.0), &|_, _| ());
         let search = Search { prepared: &prepared, progress: &|_, _| (), done: Cell::new(0.0) };
-        search.forward_selection(search.start(), &mut Tried::default()).white.model.effects
+        search.forward_selection(search.start(), &mut Tried::default()).white_fit.model.effects
     };
     let of_the_machine = chosen(&[turned_slowly(&machine, 0.8)]);
     assert!(!of_the_machine.is_empty(), "the fitted recordings show something");

@@ -125,8 +125,7 @@ impl Warp {
         if values.is_empty() {
             values = vec![0.0, 1.0];
         }
-        let at = |i: usize| values[(values.len() - 1) * i / QUANTILES];
-        Self { quantiles: (0..=QUANTILES).map(at).collect() }
+        Self { quantiles: (0..=QUANTILES).map(|i| values[(values.len() - 1) * i / QUANTILES]).collect() }
     }
 
     pub(crate) fn range(&self) -> (f64, f64) {

@@ -60,9 +60,9 @@ pub(crate) struct Taken {
 impl Densities {
     /// Returns the gain of each form in addition to the model, largest first.
     pub(crate) fn taken(&self) -> Vec<Taken> {
-        let one =
+        let taken =
             |(inputs, with): &(Inputs, Density)| Taken { inputs: *inputs, gain: with.over(&self.alone) };
-        let mut all: Vec<Taken> = self.with.iter().map(one).collect();
+        let mut all: Vec<Taken> = self.with.iter().map(taken).collect();
         all.sort_by(|a, b| b.gain.sum.total_cmp(&a.gain.sum));
         all
     }

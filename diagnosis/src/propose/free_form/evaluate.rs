@@ -14,7 +14,7 @@ use numerics::linear::{Factor, Square, dot};
 use numerics::parallel;
 
 /// Segments that are scored together, and such units that are left out together.
-const TOGETHER: usize = 3;
+const SEGMENTS_A_UNIT: usize = 3;
 const FOLDS: usize = 5;
 
 /// Units of a recording in blocks, and the fold of each.
@@ -27,7 +27,7 @@ impl Units {
     fn of(track: &BlockedRecording) -> Self {
         let segments: Vec<(usize, usize)> = track.blocks.segments.windows(2).map(|w| (w[0], w[1])).collect();
         let bounds: Vec<(usize, usize)> =
-            segments.chunks(TOGETHER).map(|c| (c[0].0, c[c.len() - 1].1)).collect();
+            segments.chunks(SEGMENTS_A_UNIT).map(|c| (c[0].0, c[c.len() - 1].1)).collect();
         let fold = (0..bounds.len()).map(|i| i * FOLDS / bounds.len()).collect();
         Self { bounds, fold }
     }
@@ -282,13 +282,13 @@ impl Evaluator<'_> {
     pub(crate) fn densities(&self, model: &Model) -> Densities {
         let base = self.base(model);
         let alone = Normal::new(self, &base, None).density(&base.precision);
-        let of = |form: &Form| {
+        let with_form = |form: &Form| {
             let normal = Normal::new(self, &base, Some(form));
             let precision = self.most_likely(form, &base, &normal);
             (form.inputs, normal.density(&precision))
         };
         let forms: Vec<&Form> = self.forms.iter().filter(|form| !form.frequency.is_empty()).collect();
-        let with = parallel::map_all(&forms, |form| of(form));
+        let with = parallel::map_all(&forms, |form| with_form(form));
         Densities { alone, with }
     }
 

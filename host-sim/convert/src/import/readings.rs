@@ -37,7 +37,7 @@ const SPIKE: f64 = 8.0;
 /// The most rows of a stretch that jumps away and back.
 const LONGEST: usize = 20;
 /// More of the rows than this part are no outliers.
-const MOST: f64 = 0.02;
+const MOST_OUTLIERS: f64 = 0.02;
 
 /// Makes values that stand for none missing (NaN), with a note.
 pub(super) fn without_sentinels(role: Role, values: &[f64], notes: &mut Vec<String>) -> Vec<f64> {
@@ -175,7 +175,9 @@ pub(super) fn without_outliers(run: Rows, notes: &mut Vec<String>) -> Rows {
         }
     }
     let found: Vec<usize> = (0..n).filter(|i| bad[*i]).collect();
-    let Some(first) = found.first().filter(|_| (found.len() as f64) < MOST * n as f64) else { return run };
+    let Some(first) = found.first().filter(|_| (found.len() as f64) < MOST_OUTLIERS * n as f64) else {
+        return run;
+    };
     notes.push(format!(
         "{} rows whose position jumps away and back left out, the first at {:.4} s ({} between {} and {}); --keep-outliers keeps them",
         found.len(),

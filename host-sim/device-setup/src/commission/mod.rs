@@ -5,7 +5,7 @@
 pub mod findings;
 pub mod weigh;
 
-use crate::bench::{Act, Bench, Line, ticks};
+use crate::bench::{Act, DeviceDialogue, Line, ticks};
 use control_core::compensation::Compensation;
 use control_core::config::Sensors;
 use control_core::event::Fault;
@@ -191,7 +191,7 @@ pub async fn commission(
     wish: &Wish,
     mut ask: impl AsyncFnMut(CommissioningStep) -> Result<(), Error>,
 ) -> Result<CommissioningOutcome, Error> {
-    let mut bench = Bench::open(line).await?;
+    let mut bench = DeviceDialogue::open(line).await?;
     guard_supply(&mut bench, &mut ask).await?;
     let before = bench.device().await?;
     // Whatever it was: until it has passed again it is not commissioned, and the forces that were
@@ -238,7 +238,7 @@ pub async fn commission(
 /// Has the device prove itself by pulses under its new part and gives it what they show. Earlier it
 /// allowed this `stiffness`.
 async fn prove(
-    bench: &mut Bench<'_>,
+    bench: &mut DeviceDialogue<'_>,
     device: &mut Device,
     stiffness: Stiffness,
     ask: &mut impl AsyncFnMut(CommissioningStep) -> Result<(), Error>,
@@ -268,7 +268,7 @@ async fn prove(
 /// Sees that a brown-out reset guards the supply, for no pulse is played without; one that is off
 /// is set if the person agrees.
 async fn guard_supply(
-    bench: &mut Bench<'_>,
+    bench: &mut DeviceDialogue<'_>,
     ask: &mut impl AsyncFnMut(CommissioningStep) -> Result<(), Error>,
 ) -> Result<(), Error> {
     let mut answer = bench.guard_supply(false).await?;
@@ -282,7 +282,10 @@ async fn guard_supply(
 
 /// Finds the mechanism by pulses, and whether the motor's leads are reversed; then the device
 /// drives it the other way from now on.
-async fn find_mechanism(bench: &mut Bench<'_>, device: &mut Device) -> Result<(Mechanism, bool), Error> {
+async fn find_mechanism(
+    bench: &mut DeviceDialogue<'_>,
+    device: &mut Device,
+) -> Result<(Mechanism, bool), Error> {
     if let Some(mechanism) = pulses(bench, device).await? {
         return Ok((mechanism, false));
     }
@@ -294,7 +297,7 @@ async fn find_mechanism(bench: &mut Bench<'_>, device: &mut Device) -> Result<(M
 }
 
 /// Plays the pulses and returns the mechanism; `None` if the motor turns against its torque.
-async fn pulses(bench: &mut Bench<'_>, device: &Device) -> Result<Option<Mechanism>, Error> {
+async fn pulses(bench: &mut DeviceDialogue<'_>, device: &Device) -> Result<Option<Mechanism>, Error> {
     let excitation = Excitation {
         signal: Signal::BreakawayRamps { torque: GENTLE_TORQUE, ramp_ms: PULSE_MS },
         duration_ms: 2 * PULSES * u32::from(PULSE_MS),

@@ -4,7 +4,7 @@
 //! pulls without the weight too does not show in the difference.
 
 use super::{CommissioningOutcome, CommissioningStep, prove, to_toml};
-use crate::bench::{Act, Bench, Line};
+use crate::bench::{Act, DeviceDialogue, Line};
 use control_core::compensation::Compensation;
 use control_core::config::Sensors;
 use control_core::controller::Sample;
@@ -101,7 +101,7 @@ pub async fn weigh(
     wish: &WeighWish,
     mut ask: impl AsyncFnMut(CommissioningStep) -> Result<(), Error>,
 ) -> Result<WeighOutcome, Error> {
-    let mut bench = Bench::open(line).await?;
+    let mut bench = DeviceDialogue::open(line).await?;
     let device = bench.device().await?;
     may_hang(&device, wish.grams)?;
     ask(CommissioningStep::PointStraightDown).await?;
@@ -183,7 +183,7 @@ struct Strokes {
 }
 
 /// Moves the needle with `grams` on it.
-async fn strokes(bench: &mut Bench<'_>, device: &Device, grams: f64) -> Result<Strokes, Error> {
+async fn strokes(bench: &mut DeviceDialogue<'_>, device: &Device, grams: f64) -> Result<Strokes, Error> {
     bench.act(Act::Hang(grams));
     let excitation = down_and_up(device, grams);
     let longest = Duration::from_millis(u64::from(excitation.duration_ms) + 5_000);
@@ -266,7 +266,7 @@ fn found(bare: &Strokes, hung: &Strokes, device: &Device, grams: f64) -> Result<
 
 /// Gives the device `factor` times its torque at full scale, and has it prove itself again.
 async fn correct(
-    bench: &mut Bench<'_>,
+    bench: &mut DeviceDialogue<'_>,
     before: &Device,
     factor: f64,
     permille: u16,

@@ -14,7 +14,7 @@ use std::f64::consts::TAU;
 
 /// Gains at `--gain 1`: so much of what was found. Of friction less, for it is what keeps a stiff
 /// wall quiet.
-const MOST: [f64; 4] = [0.92, 0.8, 0.92, 0.92];
+const FULL_GAINS: [f64; 4] = [0.92, 0.8, 0.92, 0.92];
 /// Friction is given back above so many counts in a window of the speed estimate, and all of it
 /// from so many on: slow hands insert at 3 mm/s, where a count in a window is 1.2 mm/s.
 const REST_COUNTS: f64 = 1.06;
@@ -150,7 +150,7 @@ impl NormalEquations {
             let viscous = I8F24::checked_from_num(viscous).ok_or_else(|| not_a_size(viscous))?;
             Ok(Friction { dry: mnm(self.dry[direction].max(0.0))?, viscous: Damping(viscous) })
         };
-        let [angle_gain, friction_gain, weight_gain, drive_gain] = MOST.map(|most| gain(most * share));
+        let [angle_gain, friction_gain, weight_gain, drive_gain] = FULL_GAINS.map(|most| gain(most * share));
         let count_speed =
             TAU * radius / f64::from(device.counts_per_turn) * f64::from(TICK_HZ) / f64::from(WINDOW_TICKS);
         let speed = |counts: f64| fixed(counts * count_speed).map(MillimetresPerSecond);

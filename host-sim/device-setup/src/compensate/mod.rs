@@ -11,7 +11,7 @@ mod trials;
 mod turns;
 pub mod weight;
 
-use crate::bench::{Act, Bench, Line};
+use crate::bench::{Act, DeviceDialogue, Line};
 use coefficients::Found;
 use control_core::controller::Sample;
 use control_core::excitation::Excitation;
@@ -55,7 +55,7 @@ pub async fn compensate(
     wish: Wish,
     mut ask: impl AsyncFnMut(CompensationStep) -> Result<(), Error>,
 ) -> Result<CompensationOutcome, Error> {
-    let mut bench = Bench::open(line).await?;
+    let mut bench = DeviceDialogue::open(line).await?;
     let device = bench.device().await?;
     if !device.commissioned {
         return Err(Error::failed("the device has not been commissioned; run host-sim commission first"));
@@ -83,7 +83,7 @@ fn plan(device: &Device) -> Result<Plan, Error> {
 
 /// The device while it is compensated.
 struct Work<'a, 'b, A> {
-    bench: &'a mut Bench<'b>,
+    bench: &'a mut DeviceDialogue<'b>,
     /// As it was.
     before: Device,
     found: Found,
@@ -189,7 +189,7 @@ impl<A: AsyncFnMut(CompensationStep) -> Result<(), Error>> Work<'_, '_, A> {
 
 /// Finds the rotor's angle again on a device that was compensated and then restarted.
 pub async fn align(line: &mut dyn Line, rig: &Rig) -> Result<angle::Angle, Error> {
-    let mut bench = Bench::open(line).await?;
+    let mut bench = DeviceDialogue::open(line).await?;
     let device = bench.device().await?;
     let found = coefficients::found(rig, &device, 1.0)?;
     if !device.compensation.needs_angle() {

@@ -6,7 +6,7 @@ use super::plan;
 use super::residual_force::{self, ResidualForce};
 use super::step::{CompensationStep, Part};
 use super::turns::{excitations, play, seconds};
-use crate::bench::Bench;
+use crate::bench::DeviceDialogue;
 use control_core::Device;
 use control_core::compensation::Gain;
 use device_sim::error::Error;
@@ -24,7 +24,7 @@ pub(super) struct Trial {
 
 /// The device while parts are tried on it.
 pub(super) struct Trials<'a, 'b, A> {
-    pub(super) bench: &'a mut Bench<'b>,
+    pub(super) bench: &'a mut DeviceDialogue<'b>,
     pub(super) ask: &'a mut A,
     /// The inertia that was found, kg·m².
     pub(super) inertia: f64,

@@ -1,6 +1,6 @@
 //! The slow turns and the hold that are played before and after, and how long they take.
 
-use crate::bench::Bench;
+use crate::bench::DeviceDialogue;
 use crate::servo::servo;
 use control_core::controller::Sample;
 use control_core::excitation::{Excitation, Signal};
@@ -39,14 +39,17 @@ pub(super) fn seconds(excitation: &Excitation) -> f64 {
 }
 
 pub(super) async fn play(
-    bench: &mut Bench<'_>,
+    bench: &mut DeviceDialogue<'_>,
     turns: &Excitation,
     hold: &Excitation,
 ) -> Result<(Vec<Sample>, Vec<Sample>), Error> {
     Ok((played(bench, turns).await?, played(bench, hold).await?))
 }
 
-pub(super) async fn played(bench: &mut Bench<'_>, excitation: &Excitation) -> Result<Vec<Sample>, Error> {
+pub(super) async fn played(
+    bench: &mut DeviceDialogue<'_>,
+    excitation: &Excitation,
+) -> Result<Vec<Sample>, Error> {
     bench.settle().await?;
     let longest = Duration::from_millis(u64::from(excitation.duration_ms) + 5_000);
     match bench.play_within(excitation, longest).await? {

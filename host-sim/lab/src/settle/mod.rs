@@ -2,19 +2,19 @@
 //! rivals, and records again, until one name is left or nothing distinguishes the rest. What
 //! was settled is fed forward by the device, as far as it can be.
 
-mod feel;
-mod following;
-mod kept;
-mod looks;
+mod carried_names;
+mod feed_forward;
 mod name;
+mod next_round;
 mod page;
 mod patched;
 mod play;
+mod repeat_testing;
 mod settled;
 mod subject;
 mod undesigned;
 
-pub use feel::Feel;
+pub use feed_forward::Feel;
 pub use name::Name;
 pub use settled::{Round, Settled};
 pub use subject::Subject;
@@ -28,7 +28,7 @@ use diagnosis::report::Report;
 use diagnosis::rig::Rig;
 use diagnosis::{Outcome, Request};
 use experiment::{Design, Input};
-use following::following;
+use next_round::next_round;
 use play::Limited;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
@@ -119,7 +119,7 @@ pub enum Progress<'a> {
 }
 
 /// A round that is to be played.
-struct Asked {
+struct PlannedRound {
     programmes: Vec<Programme>,
     words: String,
     why: String,
@@ -183,7 +183,8 @@ impl Run<'_> {
         if self.settings.compensate {
             let wish = Wish { motion_s: MOST_MOTION_S - settled.motion_s(), ..Wish::default() };
             let radius_mm = self.limited.radius_mm();
-            settled.feel = Some(feel::feel(subject, &found, self.settings, (radius_mm, wish), progress)?);
+            settled.feel =
+                Some(feed_forward::apply(subject, &found, self.settings, (radius_mm, wish), progress)?);
         }
         Ok(())
     }
@@ -222,7 +223,7 @@ impl Run<'_> {
             settled.count_looks(self.settings.most_rounds());
             progress(Progress::Said(&report.sentence))?;
             let folder = folder.join("report");
-            match following(&self.limited, report, &folder, self.settings, settled)? {
+            match next_round(&self.limited, report, &folder, self.settings, settled)? {
                 Ok(next) => asked = next,
                 Err(conclusion) => {
                     settled.conclusion = conclusion;
@@ -273,7 +274,7 @@ fn written_rig(path: &Path, rig: &Rig) -> Result<(), Error> {
     })
 }
 
-fn first(limited: &Limited, rig: &Rig, settings: &Settings) -> Result<Asked, Error> {
+fn first(limited: &Limited, rig: &Rig, settings: &Settings) -> Result<PlannedRound, Error> {
     match settings.inputs {
         Inputs::Designed => {
             let why = "no recording yet: speeds, reversals and frequencies of every kind";
@@ -281,7 +282,7 @@ fn first(limited: &Limited, rig: &Rig, settings: &Settings) -> Result<Asked, Err
         }
         Inputs::Multisines => limited.multisine(settings.seed, GENERAL_S.min(0.5 * settings.rounds_s())),
         Inputs::Passive => limited.practice(0.5 * settings.rounds_s()),
-        Inputs::Characterise => limited.checked(Asked {
+        Inputs::Characterise => limited.checked(PlannedRound {
             programmes: shortened(programmes(rig, limited.radius_mm()), settings.rounds_s()),
             words: "the excitations of characterise".into(),
             why: "the set that characterise plays".into(),
@@ -324,7 +325,7 @@ fn diagnosed(
 }
 
 /// The round of a report; `before` are the names of the round before.
-fn round(asked: Asked, report: &Report, before: &[Name]) -> Round {
+fn round(asked: PlannedRound, report: &Report, before: &[Name]) -> Round {
     let name = |name: Option<EffectName>| name.map_or("none", |name| name.as_str());
     let contenders: Vec<(String, f64)> =
         report.contenders.iter().map(|c| (name(c.name).to_owned(), c.probability)).collect();
@@ -335,7 +336,7 @@ fn round(asked: Asked, report: &Report, before: &[Name]) -> Round {
         asked: asked.words,
         why: asked.why,
         sentence: report.sentence.clone(),
-        names: kept::kept(before, names(report), &contenders),
+        names: carried_names::carried(before, names(report), &contenders),
         contenders,
     }
 }

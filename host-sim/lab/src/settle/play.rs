@@ -1,6 +1,6 @@
 //! Inputs as excitations of the device, within its limits.
 
-use super::{Asked, in_words};
+use super::{PlannedRound, in_words};
 use crate::characterise;
 use crate::characterise::programme::{Programme, ProgrammeStep, TRAVEL_MM};
 use control_core::excitation::{self, Excitation, Servo};
@@ -55,7 +55,7 @@ impl Limited {
     }
 
     /// A round of a designed input.
-    pub(super) fn designed(&self, design: Design) -> Result<Asked, Error> {
+    pub(super) fn designed(&self, design: Design) -> Result<PlannedRound, Error> {
         let why = design.chosen.nearest().map_or(String::new(), |pair| {
             format!(
                 "of {} inputs it best tells {} rivals apart; the nearest pair, {} and {}, by {:.0} nats",
@@ -78,18 +78,18 @@ impl Limited {
         input: &Input,
         why: String,
         design: Option<(Box<Design>, Servo)>,
-    ) -> Result<Asked, Error> {
+    ) -> Result<PlannedRound, Error> {
         let (design, servo) = design.map_or((None, self.servo), |(design, servo)| (Some(design), servo));
         let programme = |file, input: &Input| {
             let steps = input.segments.iter().map(|segment| self.step(segment, servo)).collect();
             Programme { file, steps }
         };
         let programmes = vec![programme("fit.csv", input), programme("holdout.csv", &input.varied())];
-        self.checked(Asked { programmes, words: in_words(input), why, design })
+        self.checked(PlannedRound { programmes, words: in_words(input), why, design })
     }
 
     /// The same, if the device may play it: it is refused here, before anything moves.
-    pub(super) fn checked(&self, asked: Asked) -> Result<Asked, Error> {
+    pub(super) fn checked(&self, asked: PlannedRound) -> Result<PlannedRound, Error> {
         characterise::check(&self.config, &asked.programmes)?;
         Ok(asked)
     }

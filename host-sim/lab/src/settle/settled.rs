@@ -1,8 +1,8 @@
 //! The rounds of a run and the names that it ends with.
 
-use super::feel::Feel;
-use super::looks;
+use super::feed_forward::Feel;
 use super::name::Name;
+use super::repeat_testing;
 
 /// One round.
 #[derive(Clone, Debug)]
@@ -46,7 +46,7 @@ impl Settled {
     /// Takes the names from the rounds so far.
     pub(super) fn count_looks(&mut self, most: usize) {
         let rounds: Vec<Vec<Name>> = self.rounds.iter().map(|round| round.names.clone()).collect();
-        (self.names, self.unsure) = looks::corrected(&rounds, most);
+        (self.names, self.unsure) = repeat_testing::corrected(&rounds, most);
     }
 
     /// Sentences, without their full stops, on the names that are not sure enough.
@@ -56,7 +56,7 @@ impl Settled {
             format!(
                 "not named: {}; {}, and with every look counted it is {:.0} % sure",
                 name.in_words(),
-                match looks::since(name, &rounds) {
+                match repeat_testing::since(name, &rounds) {
                     1 => "no round was sure of it".to_owned(),
                     round => format!("it came up only in round {round}"),
                 },

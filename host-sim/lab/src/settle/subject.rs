@@ -9,7 +9,7 @@ use crate::characterise::{self, News, configuration};
 use crate::commission::bench::{Line, WireLine};
 use crate::commission::mechanism::VirtualLine;
 use control_core::Config;
-use device_setup::bench::Bench;
+use device_setup::bench::DeviceDialogue;
 use device_setup::pause::block_on;
 use device_sim::device::{Port, Wire};
 use device_sim::error::Error;
@@ -42,7 +42,7 @@ impl Subject<'_> {
     pub(super) fn config(&mut self) -> Result<Config, Error> {
         let Self::Real { port, stop } = self else { return Ok(configuration()) };
         let mut line = WireLine::new(opened(*port)?, stop);
-        let device = block_on(async { Bench::open(&mut line).await?.device().await })?;
+        let device = block_on(async { DeviceDialogue::open(&mut line).await?.device().await })?;
         if !device.commissioned {
             return Err(Error::failed("the device has not been commissioned; run host-sim commission first"));
         }

@@ -1,7 +1,7 @@
 //! Inputs without a design: rounds of some of everything, random multisines, and strokes as in
 //! practice.
 
-use super::Asked;
+use super::PlannedRound;
 use super::play::Limited;
 use device_sim::error::Error;
 use experiment::{Input, Limits, Segment, Signal, random_multisine};
@@ -21,7 +21,7 @@ const STROKES_S: f64 = 3.0;
 
 impl Limited {
     /// A round of some of everything.
-    pub(super) fn general(&self, why: &str, most_s: f64) -> Result<Asked, Error> {
+    pub(super) fn general(&self, why: &str, most_s: f64) -> Result<PlannedRound, Error> {
         let rad = |mm: f64| mm / self.radius_mm();
         let frequencies = vec![3, 5, 9, 14, 21, 32, 47, 68, 97, 139, 197, 281];
         let signals = [
@@ -48,7 +48,7 @@ impl Limited {
 
     /// A later round of some of everything, with other numbers: other speeds, faster reversals, and
     /// twice the force, all of them `pace` times as much, 0.5 to 1.
-    pub(super) fn general_again(&self, why: &str, pace: f64, most_s: f64) -> Result<Asked, Error> {
+    pub(super) fn general_again(&self, why: &str, pace: f64, most_s: f64) -> Result<PlannedRound, Error> {
         let rad = |mm: f64| pace * mm / self.radius_mm();
         let line = |hz: u16| (pace * f64::from(hz)).round() as u16;
         let frequencies = [6, 10, 16, 24, 36, 52, 75, 108, 151, 212, 289, 390].map(line).to_vec();
@@ -67,7 +67,7 @@ impl Limited {
     }
 
     /// A round of a random multisine.
-    pub(super) fn multisine(&self, seed: u64, most_s: f64) -> Result<Asked, Error> {
+    pub(super) fn multisine(&self, seed: u64, most_s: f64) -> Result<PlannedRound, Error> {
         let (travel, speed, force) = self.limits();
         // A recording that travels nowhere is refused, so strokes precede the sines.
         let stroke = Signal::Triangle { stroke: 0.1 * travel, speed: 0.1 * speed };
@@ -78,7 +78,7 @@ impl Limited {
     }
 
     /// A round as practice moves the needle: in and out at a hand's speeds.
-    pub(super) fn practice(&self, seconds: f64) -> Result<Asked, Error> {
+    pub(super) fn practice(&self, seconds: f64) -> Result<PlannedRound, Error> {
         let rad = |mm: f64| mm / self.radius_mm();
         let strokes = |(stroke, speed, part): (f64, f64, f64)| {
             (Signal::Triangle { stroke: rad(stroke), speed: rad(speed) }, part)
@@ -117,7 +117,7 @@ mod tests {
             .for_each(|asked| leaves_a_fifth(&asked.expect("it is within the limits"), &limited));
     }
 
-    fn leaves_a_fifth(asked: &Asked, limited: &Limited) {
+    fn leaves_a_fifth(asked: &PlannedRound, limited: &Limited) {
         let (_, most_per_s, most_torque) = limited.limits();
         for step in asked.programmes.iter().flat_map(|programme| &programme.steps) {
             let (mm, mm_per_s, torque) = most(&step.excitation.signal);

@@ -30,7 +30,7 @@ struct Shared {
 }
 
 #[derive(Deserialize)]
-struct Asked {
+struct Credentials {
     token: Option<String>,
 }
 
@@ -55,7 +55,7 @@ pub(super) async fn serve(
 
 async fn connect(
     State(shared): State<Shared>,
-    Query(asked): Query<Asked>,
+    Query(asked): Query<Credentials>,
     headers: HeaderMap,
     upgrade: WebSocketUpgrade,
 ) -> Response {

@@ -16,17 +16,17 @@ mod connection;
 mod debrief;
 mod demonstration;
 mod gate;
+mod read_only_page;
 mod server;
 mod shared;
-mod watched;
 mod workbench;
 
 pub use debrief::Debrief;
 pub use demonstration::Demonstration;
+pub use read_only_page::{Said, Watch, Watches};
 pub use server::{
     ServeError, Server, serve, serve_guide, serve_watched, serve_with_reports, serve_workbench,
 };
-pub use watched::{Said, Watch, Watches};
 pub use workbench::Workbench;
 
 #[cfg(test)]

@@ -5,8 +5,8 @@ use super::connection;
 use super::debrief::{self, Debrief};
 use super::demonstration::{self, Demonstration};
 use super::gate::{self, Gate, Peer};
+use super::read_only_page::{self, Said, Watched, Watches};
 use super::shared::Shared;
-use super::watched::{self, Said, Watched, Watches};
 use super::workbench::{self, Workbench};
 use crate::bounded_listener::BoundedListener;
 use axum::Router;
@@ -174,14 +174,14 @@ pub fn serve_with_reports(
 
 /// Serves a page of a class, which only looks at what `watches` give, as [`serve`] does.
 pub fn serve_watched(watches: Watches, port: u16) -> Result<Server, ServeError> {
-    let live = get(watched::live).with_state(Watched { watches, said: None });
+    let live = get(read_only_page::live).with_state(Watched { watches, said: None });
     start(local(port), &CLASS_PAGE, Router::new().route("/live", live))
 }
 
 /// Serves the page of a guide, which looks at what `watches` give and agrees by what `said` takes,
 /// as [`serve`] does.
 pub fn serve_guide(watches: Watches, said: Said, port: u16) -> Result<Server, ServeError> {
-    let live = get(watched::live).with_state(Watched { watches, said: Some(said) });
+    let live = get(read_only_page::live).with_state(Watched { watches, said: Some(said) });
     start(local(port), &GUIDE_PAGE, Router::new().route("/live", live))
 }
 

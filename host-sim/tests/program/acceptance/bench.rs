@@ -41,7 +41,7 @@ pub(crate) enum Event {
 }
 
 /// A started device.
-pub(crate) struct Bench {
+pub(crate) struct StartedDevice {
     core: Controller,
     plant: Plant,
     full_scale_n: f64,
@@ -52,7 +52,7 @@ pub(crate) struct Bench {
     pub(crate) events: Vec<Event>,
 }
 
-impl Bench {
+impl StartedDevice {
     /// At the patient's entry angle.
     pub(crate) fn of(profile: &str) -> Self {
         let profile = Profile::find(profile).expect("it is built in");

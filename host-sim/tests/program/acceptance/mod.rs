@@ -4,7 +4,7 @@
 
 mod bench;
 
-use bench::{Bench, Event, number};
+use bench::{Event, StartedDevice, number};
 use control_core::config::Tissue;
 use control_core::event::{Limits, State, VesselState};
 use device_sim::profile::Profile;
@@ -16,7 +16,7 @@ fn profile(name: &str) -> Profile {
 /// Paper 001, 2.2, condition 1: "Eliminate loss or distortion of haptic feedback".
 #[test]
 fn paper_001_condition_1_no_loss_or_distortion() {
-    let mut bench = Bench::of("adult");
+    let mut bench = StartedDevice::of("adult");
     let begin = bench.seen.len();
     bench.go(14.0, 8.0);
     bench.go(-1.0, 8.0);
@@ -36,7 +36,7 @@ fn paper_001_condition_1_no_loss_or_distortion() {
 /// Paper 001, 2.2, condition 2: "Minimize primitive friction".
 #[test]
 fn paper_001_condition_2_no_own_force_outside_tissue() {
-    let mut bench = Bench::of("adult");
+    let mut bench = StartedDevice::of("adult");
     bench.go(-0.2, 10.0);
     bench.go(-2.0, 10.0);
     assert!(
@@ -52,7 +52,7 @@ fn paper_001_condition_2_no_own_force_outside_tissue() {
 #[test]
 fn paper_001_condition_3_no_slip_at_the_largest_force() {
     let slipped_mm = |grip_n: f64| {
-        let mut bench = Bench::new(&profile("firm-skin"), 30.0, grip_n);
+        let mut bench = StartedDevice::new(&profile("firm-skin"), 30.0, grip_n);
         bench.go(12.0, 8.0);
         bench.go(-1.0, 8.0);
         (bench.tip_mm() - bench.now().depth_mm).abs()
@@ -66,7 +66,7 @@ fn paper_001_condition_3_no_slip_at_the_largest_force() {
 fn paper_001_condition_4_two_degrees_of_freedom() {
     let vein_mm = |angle_deg: f64| {
         let adult = profile("adult");
-        let mut bench = Bench::new(&adult, angle_deg, 4.0);
+        let mut bench = StartedDevice::new(&adult, angle_deg, 4.0);
         bench.go(4.8 / angle_deg.to_radians().sin() + 3.0, 8.0);
         bench.contact_mm(number(&adult, Tissue::Vessel))
     };
@@ -86,7 +86,7 @@ fn paper_001_condition_5_initial_slope_and_its_range() {
     // the skin at the depth that belongs to the new slope.
     let vein = number(&adult, Tissue::Vessel);
     let met_mm = |to_deg: f64| {
-        let mut bench = Bench::of("adult");
+        let mut bench = StartedDevice::of("adult");
         bench.go(6.0, 8.0);
         bench.turn(to_deg);
         bench.go(24.0, 8.0);
@@ -107,7 +107,7 @@ fn paper_002_need_1_any_insertion_point() {
     let bursa = number(&shoulder, Tissue::Bursa);
     let bursa_mm: f64 = shoulder.config.patient.layers[usize::from(bursa)].depth.0.to_num();
     for angle_deg in [40.0, 60.0, 85.0_f64] {
-        let mut bench = Bench::new(&shoulder, angle_deg, 4.0);
+        let mut bench = StartedDevice::new(&shoulder, angle_deg, 4.0);
         let sine = angle_deg.to_radians().sin();
         bench.go((bursa_mm + 1.0) / sine, 10.0);
         let depth_mm = bench.contact_mm(bursa) * sine;
@@ -125,7 +125,7 @@ fn paper_002_need_1_any_insertion_point() {
 /// prefixed maximum angle is not exceeded".
 #[test]
 fn paper_002_need_2_direction_held_up_to_a_largest_angle() {
-    let mut bench = Bench::of("shoulder");
+    let mut bench = StartedDevice::of("shoulder");
     bench.go(12.0, 8.0);
     assert!(bench.now().lateral_n.abs() < 0.02, "no force across in the direction of entry");
     bench.turn(50.0);
@@ -143,7 +143,7 @@ fn paper_002_need_2_direction_held_up_to_a_largest_angle() {
 #[test]
 fn paper_002_need_3_stiffness_by_tissue_and_patient() {
     let skin_n = |name: &str| {
-        let mut bench = Bench::of(name);
+        let mut bench = StartedDevice::of(name);
         bench.go(5.0, 4.0);
         bench.largest_n(0.0, 5.0)
     };
@@ -151,7 +151,7 @@ fn paper_002_need_3_stiffness_by_tissue_and_patient() {
     assert!(thin < 0.8 * adult && adult < 0.8 * firm, "skin: {thin}, {adult}, {firm} N");
 
     let shoulder = profile("shoulder");
-    let mut bench = Bench::of("shoulder");
+    let mut bench = StartedDevice::of("shoulder");
     bench.go(46.0, 6.0);
     use Tissue::{Bursa, Cartilage, Fat, Muscle, Skin, Tendon};
     let tissues = [Skin, Fat, Muscle, Bursa, Tendon, Cartilage];
@@ -167,7 +167,7 @@ fn paper_002_need_3_stiffness_by_tissue_and_patient() {
 #[test]
 fn paper_002_need_4_a_released_needle_stays() {
     for (name, depth_mm) in [("adult", 8.0), ("shoulder", 20.0), ("phantom", 7.0)] {
-        let mut bench = Bench::of(name);
+        let mut bench = StartedDevice::of(name);
         bench.go(depth_mm, 6.0);
         bench.rest(1.5);
         let stopped_mm = bench.tip_mm();
@@ -185,7 +185,7 @@ fn paper_002_need_4_a_released_needle_stays() {
 /// rest there with the needle in tissue.
 #[test]
 fn paper_002_need_5_a_hand_may_rest_with_the_needle_in() {
-    let mut bench = Bench::of("shoulder");
+    let mut bench = StartedDevice::of("shoulder");
     bench.go(20.0, 6.0);
     bench.rest(2.0);
     let (place_mm, force_n) = (bench.tip_mm(), bench.now().given_n);
@@ -205,7 +205,7 @@ fn paper_002_need_5_a_hand_may_rest_with_the_needle_in() {
 fn paper_000_layer_transitions_are_detected_and_felt() {
     let phantom = profile("phantom");
     for angle_deg in [30.0, 45.0, 60.0_f64] {
-        let mut bench = Bench::new(&phantom, angle_deg, 4.0);
+        let mut bench = StartedDevice::new(&phantom, angle_deg, 4.0);
         let sine = angle_deg.to_radians().sin();
         bench.go(9.0 / sine, 5.0);
         for (layer, depth_mm) in [(0, 0.0), (1, 4.0), (2, 7.0)] {
@@ -225,7 +225,7 @@ fn paper_000_layer_transitions_are_detected_and_felt() {
 /// vessel." (The page's tests look at what is displayed.)
 #[test]
 fn paper_000_vessel_intersection_is_detected() {
-    let mut bench = Bench::of("phantom");
+    let mut bench = StartedDevice::of("phantom");
     bench.go(10.0, 5.0);
     bench.go(-1.0, 5.0);
     let mut states: Vec<VesselState> = bench.seen.iter().map(|s| s.vessel).collect();
@@ -238,7 +238,7 @@ fn paper_000_vessel_intersection_is_detected() {
 
     let beside = profile("phantom").source.text + "\n[vessel]\nwidth_mm = 3.0\noffset_mm = 4.0\n";
     let beside = Profile::parse(device_sim::named_files::Text { origin: "beside.toml".into(), text: beside });
-    let mut bench = Bench::new(&beside.expect("it is sound"), 60.0, 4.0);
+    let mut bench = StartedDevice::new(&beside.expect("it is sound"), 60.0, 4.0);
     bench.go(10.0, 5.0);
     assert!(bench.seen.iter().all(|s| !matches!(s.vessel, InLumen | Through)), "it passes beside");
     assert!(bench.seen.iter().any(|s| s.vessel == VesselState::Beside));

@@ -1,7 +1,7 @@
 //! The round that follows the last one, or the conclusion.
 
 use super::play::Limited;
-use super::{Asked, Inputs, Settings, Settled};
+use super::{Inputs, PlannedRound, Settings, Settled};
 use device_sim::error::Error;
 use diagnosis::report::{Contending, Report, Verdict};
 use experiment::{Case, design};
@@ -16,13 +16,13 @@ const LEAST_ROUNDS: usize = 2;
 const LEAST_ROUND_S: f64 = 10.0;
 
 /// The round that follows, or the conclusion if none does.
-pub(super) fn following(
+pub(super) fn next_round(
     limited: &Limited,
     report: &Report,
     folder: &Path,
     settings: &Settings,
     settled: &Settled,
-) -> Result<Result<Asked, String>, Error> {
+) -> Result<Result<PlannedRound, String>, Error> {
     let (played, rounds) = (settled.motion_s(), settled.rounds.len());
     let left_s = settings.rounds_s() - played;
     let is_sure = settled.unsure.is_empty() || settings.inputs != Inputs::Designed;
@@ -115,7 +115,7 @@ fn next(
     folder: &Path,
     settings: &Settings,
     (rounds, left_s): (usize, f64),
-) -> Result<Result<Asked, String>, Error> {
+) -> Result<Result<PlannedRound, String>, Error> {
     let seed = rounds as u64 + settings.seed;
     let again = |why: &str, most_s| limited.general_again(why, PACES[(rounds - 1) % PACES.len()], most_s);
     let most_s = INPUT_S.min(0.5 * left_s);

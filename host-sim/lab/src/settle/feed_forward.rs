@@ -28,7 +28,7 @@ pub struct Feel {
 /// # Errors
 /// A sentence if it ends after the roller has moved, for whatever reason, or a file cannot be
 /// written.
-pub(super) fn feel(
+pub(super) fn apply(
     subject: &mut Subject,
     rig: &Rig,
     settings: &Settings,

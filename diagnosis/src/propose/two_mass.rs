@@ -1,6 +1,6 @@
 //! The search for the joint between a motor and its load: the values of its law go together, have
-//! many optima, and lean on the rest of the machine. What is here moves shapes; it chooses between
-//! no effects.
+//! many optima, and depend on the fitted machine parameters. It moves shapes and chooses no
+//! effects.
 
 use crate::fit::blocked_recording::BlockedRecording;
 use crate::fit::filter::Noise;
@@ -50,13 +50,14 @@ fn elsewhere(context: &FitContext, model: &Model) -> Vec<Model> {
     out
 }
 
-/// The best model that ways downhill from other places lead to, with its merit; none where the last
+/// The best model that ways downhill from other places lead to, with its penalised
+/// log-likelihood; none where the last
 /// effect is no joint.
 pub(crate) fn search(
     context: &FitContext,
     model: &Model,
     noise: &Noise,
-    merit: &(dyn Fn(&Model) -> f64 + Sync),
+    log_score: &(dyn Fn(&Model) -> f64 + Sync),
 ) -> Option<(f64, Model)> {
     if !ends_in_joint(model) {
         return None;
@@ -67,11 +68,12 @@ pub(crate) fn search(
         found
     };
     let all: Vec<Model> = elsewhere(context, model).into_iter().collect();
-    let starts = parallel::map_all(&all, merit).into_iter().zip(all).collect();
+    let starts = parallel::map_all(&all, log_score).into_iter().zip(all).collect();
     let ends = parallel::map_all(&best(starts, STARTS), |(value, start)| {
-        descend(context, start.clone(), noise, *value, merit)
+        descend(context, start.clone(), noise, *value, log_score)
     });
-    let settled = parallel::map_all(&best(ends, SETTLED), |end| settle(context, end.clone(), noise, merit));
+    let settled =
+        parallel::map_all(&best(ends, SETTLED), |end| settle(context, end.clone(), noise, log_score));
     settled.into_iter().max_by(|a, b| a.0.total_cmp(&b.0))
 }
 
@@ -89,7 +91,7 @@ pub(crate) fn settle(
     context: &FitContext,
     (mut best, mut model): (f64, Model),
     noise: &Noise,
-    merit: &dyn Fn(&Model) -> f64,
+    log_score: &dyn Fn(&Model) -> f64,
 ) -> (f64, Model) {
     if !ends_in_joint(&model) {
         return (best, model);
@@ -98,8 +100,8 @@ pub(crate) fn settle(
         let fit = Fit::new(&model, context.nominal, context.tracks, noise);
         let mut trial = on(&context.nominal.machine(&|key| fit.value(key)), &model);
         trial.bias = (0..context.tracks.len()).map(|r| fit.bias(r)).collect();
-        let start = merit(&trial);
-        let (value, trial) = descend(context, trial, noise, start, merit);
+        let start = log_score(&trial);
+        let (value, trial) = descend(context, trial, noise, start, log_score);
         if value <= best {
             break;
         }
@@ -117,9 +119,9 @@ pub(crate) fn settled(context: &FitContext, candidate: FittedModel) -> FittedMod
     if !ends_in_joint(&candidate.model) {
         return candidate;
     }
-    let merit = |model: &Model| context.merit_of(model, &candidate.noise);
-    let found = (merit(&candidate.model), candidate.model.clone());
-    let (_, model) = settle(context, found, &candidate.noise, &merit);
+    let log_score = |model: &Model| context.log_score_of(model, &candidate.noise);
+    let found = (log_score(&candidate.model), candidate.model.clone());
+    let (_, model) = settle(context, found, &candidate.noise, &log_score);
     context.fit(model, &candidate.noise, Colour::White)
 }
 

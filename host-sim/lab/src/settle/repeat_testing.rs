@@ -1,6 +1,5 @@
-//! The confidence of a name that a run has looked for in every round: a name that chance makes in
-//! one diagnosis of twenty comes up in one run of four, if the run may stop at the first of five
-//! diagnoses that gives it.
+//! Corrects confidence for testing the same name in several rounds: a name that chance makes in one
+//! diagnosis of twenty comes up in one run of four that may stop at the first of five diagnoses.
 
 use super::name::Name;
 

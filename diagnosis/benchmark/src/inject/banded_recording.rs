@@ -97,7 +97,7 @@ impl State {
 /// One recording's equation of motion in one band, at rows that move, thinned to the band. Every
 /// column has its mean taken off: an offset is each recording's own.
 #[derive(Clone, Debug)]
-pub(crate) struct Sight {
+pub(crate) struct BandedRecording {
     rate: f64,
     band: f64,
     stamps: Vec<f64>,
@@ -120,7 +120,7 @@ pub(crate) struct Sight {
     pub(crate) nominal_grid: Vec<Vec<f64>>,
 }
 
-impl Sight {
+impl BandedRecording {
     /// Estimates the motion of the recording, with the given command and counts instead of its own.
     pub(crate) fn of(r: &Recording, rig: &RigFile, band: f64) -> Self {
         let (stamps, time, h) = grid(r);

@@ -9,7 +9,7 @@ use super::Name;
 
 /// The names of a diagnosis, or, if it gives none, those of the round before that still lead the
 /// contenders.
-pub(super) fn kept(before: &[Name], names: Vec<Name>, contenders: &[(String, f64)]) -> Vec<Name> {
+pub(super) fn carried(before: &[Name], names: Vec<Name>, contenders: &[(String, f64)]) -> Vec<Name> {
     let most = contenders.iter().max_by(|a, b| a.1.total_cmp(&b.1));
     let Some((leader, _)) = most.filter(|_| names.is_empty()) else { return names };
     before
@@ -46,7 +46,7 @@ mod tests {
     fn a_name_that_still_leads_is_kept() {
         let before = [name(&["stribeck_friction", "presliding_friction"], 0.88)];
         let left = contenders(&[("stribeck_friction", 0.8), ("none", 0.2)]);
-        assert_eq!(kept(&before, vec![], &left), [name(&["stribeck_friction"], 0.8)]);
+        assert_eq!(carried(&before, vec![], &left), [name(&["stribeck_friction"], 0.8)]);
     }
 
     #[test]
@@ -55,7 +55,7 @@ mod tests {
         let none = contenders(&[("none", 0.6), ("stribeck_friction", 0.4)]);
         let rival = contenders(&[("presliding_friction", 0.6), ("stribeck_friction", 0.3), ("none", 0.1)]);
         for left in [none, rival, vec![]] {
-            assert_eq!(kept(&before, vec![], &left), []);
+            assert_eq!(carried(&before, vec![], &left), []);
         }
     }
 
@@ -64,7 +64,7 @@ mod tests {
         let before = [name(&["stribeck_friction"], 0.88)];
         let names = vec![name(&["cogging"], 0.9)];
         let left = contenders(&[("stribeck_friction", 0.8), ("none", 0.2)]);
-        assert_eq!(kept(&before, names.clone(), &left), names);
-        assert_eq!(kept(&[], vec![], &left), [], "no round named it before");
+        assert_eq!(carried(&before, names.clone(), &left), names);
+        assert_eq!(carried(&[], vec![], &left), [], "no round named it before");
     }
 }

@@ -1,5 +1,5 @@
-//! A page that looks: it is sent a text whenever there is one. What it says goes to whoever
-//! listens, which is nobody for a class.
+//! Read-only WebSocket: sends a page each new text. What the page says goes to a listener, if there
+//! is one; a class has none.
 
 use axum::extract::ws::{Message, WebSocket};
 use axum::extract::{State, WebSocketUpgrade};
