@@ -106,12 +106,6 @@ pub(crate) fn report(board: &Board, path: &Path) -> Result<(), Error> {
             "the image takes {flash} bytes of flash and may take {LARGEST_FLASH}; make it smaller"
         )));
     }
-    if let Some(way) = &stack.tick_panics {
-        return Err(Error::new(format!(
-            "the control tick may panic: {}; have the last but one of these return what it cannot do",
-            way.join(" calls ")
-        )));
-    }
     if stack.worst() > stack.room {
         return Err(Error::new(format!(
             "the stack may need {} bytes and has {}; make it larger in the board's memory.x",

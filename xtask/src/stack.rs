@@ -10,8 +10,7 @@ mod thumb;
 
 use crate::elf::Elf;
 use crate::shell::Error;
-use std::collections::btree_map::Entry;
-use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use thumb::{Body, Code};
 
@@ -20,9 +19,6 @@ use thumb::{Body, Code};
 const EXCEPTION_FRAME: u32 = 108;
 /// Entries of the vector table before the interrupts: stack pointer, reset, faults, SysTick.
 const EXCEPTIONS: usize = 16;
-
-/// The handler of the control tick.
-const TICK: &str = "TIM4";
 
 /// The result of the analysis.
 pub(crate) struct Stack {
@@ -36,8 +32,6 @@ pub(crate) struct Stack {
     pointer_calls: usize,
     circles: usize,
     unbounded: Vec<String>,
-    /// The functions by which the control tick comes to a panic, if it does.
-    pub(crate) tick_panics: Option<Vec<String>>,
 }
 
 impl Stack {
@@ -69,35 +63,6 @@ impl fmt::Display for Stack {
         }
         Ok(())
     }
-}
-
-/// Returns the names of the functions by which `from` comes to a panic through calls that name what
-/// they call; none where it comes to none. A call through a pointer may lead anywhere and is left
-/// out.
-fn way_to_panic(
-    bodies: &BTreeMap<u32, Body>,
-    names: &BTreeMap<u32, String>,
-    from: u32,
-) -> Option<Vec<String>> {
-    let name = |function: &u32| names.get(function).cloned().unwrap_or_default();
-    let mut callers = BTreeMap::from([(from, from)]);
-    let mut open = VecDeque::from([from]);
-    while let Some(function) = open.pop_front() {
-        if name(&function).contains("panic") {
-            let back =
-                std::iter::successors(Some(function), |at| callers.get(at).filter(|up| *up != at).copied());
-            let mut way: Vec<String> = back.map(|at| name(&at)).collect();
-            way.reverse();
-            return Some(way);
-        }
-        for callee in bodies.get(&function).into_iter().flat_map(|body| body.calls.iter().copied()) {
-            if let Entry::Vacant(place) = callers.entry(callee) {
-                place.insert(function);
-                open.push_back(callee);
-            }
-        }
-    }
-    None
 }
 
 /// Analyses the image.
@@ -153,7 +118,6 @@ pub(crate) fn analyse(elf: &Elf) -> Result<Stack, Error> {
             .filter(|(_, body)| body.takes_unknown)
             .map(|(start, _)| names.get(start).cloned().unwrap_or_default())
             .collect(),
-        tick_panics: way_to_panic(&bodies, &names, place(TICK)? & !1),
     })
 }
 
@@ -273,18 +237,6 @@ mod tests {
         ]);
         let graph = Graph::new(&bodies, &BTreeSet::new());
         assert_eq!([2, 4, 6, 8].map(|f| graph.depth(f)), [110, 100, 70, 50]);
-    }
-
-    #[test]
-    fn a_panic_is_found_with_the_way_to_it() {
-        let bodies = BTreeMap::from([(2, body(0, &[4, 6], 0)), (4, body(0, &[2], 1)), (6, body(0, &[8], 0))]);
-        let names = [(2, "TIM4"), (4, "law"), (6, "enqueue"), (8, "core::panicking::panic_fmt")];
-        let names = names.map(|(at, name)| (at, name.to_owned())).into();
-        let way = way_to_panic(&bodies, &names, 2).expect("a way");
-        assert_eq!(way, ["TIM4", "enqueue", "core::panicking::panic_fmt"]);
-        assert_eq!(way_to_panic(&bodies, &names, 8).map(|way| way.len()), Some(1));
-        let bodies = BTreeMap::from([(2, body(0, &[4], 0)), (4, body(0, &[2], 1))]);
-        assert_eq!(way_to_panic(&bodies, &names, 2), None);
     }
 
     #[test]

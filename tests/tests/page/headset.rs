@@ -43,8 +43,8 @@ fn visit() -> Result<(), Error> {
     let scratch = places.scratch("page-headset")?;
     let browser = Chromium::start(&scratch)?;
     let program = Program::start(&places.program, 0, None)?;
-    without_one(&mut Page::open(&browser, &format!("{}#body", program.url), 1_440, 900, false)?)?;
-    let mut page = Page::open(&browser, &program.url, 1_440, 900, false)?;
+    without_one(&mut Page::open_lively(&browser, &format!("{}#body", program.url), 1_440, 900, false)?)?;
+    let mut page = Page::open_lively(&browser, &program.url, 1_440, 900, false)?;
     page.wait("a needle", "__stats.depthMm > -100")?;
     let file = places.target.join("node/node_modules/iwer/build/iwer.min.js");
     let emulation = std::fs::read_to_string(&file).map_err(|cause| {

@@ -57,7 +57,7 @@ fn visit() -> Result<(), Error> {
 fn can_be_touched(page: &mut Page, size: Size) -> Result<(), Error> {
     let least = if size.2 { FINGER_PX } else { 0.0 };
     let wrong = page.text(&format!(
-        "[...document.querySelectorAll('#record, #record-name, #curve, #stop, #view-events, #tasks button, #language, .heading button')].map((e) => {{
+        "[...document.querySelectorAll('#record, #record-name, #curve, #stop, #view-events, #tasks button, #language, .picture .heading button')].map((e) => {{
             e.scrollIntoView({{ block: 'center' }});
             const r = e.getBoundingClientRect();
             const hit = document.elementFromPoint(r.x + r.width / 2, r.y + r.height / 2);
